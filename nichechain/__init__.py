@@ -1,0 +1,83 @@
+"""nichechain measures how many niches the descendants of a genotype will reach.
+
+A MAP-Elites loop records which niche each child came from; the births give a Markov chain over
+niches; the chain scores niches and genotypes by l-evolvability.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from nichechain import domains
+    from nichechain.archive import Archive, Elite, load
+    from nichechain.building import build
+    from nichechain.chain import NicheChain, TransitionCounts, estimate
+    from nichechain.config import BuildConfig
+    from nichechain.errors import ArchiveError, NichechainError
+    from nichechain.evolvability import (
+        Evolvability,
+        NicheEvolvability,
+        genotype_evolvability,
+        l_evolvability,
+        niche_evolvability,
+    )
+    from nichechain.execution import Threads
+    from nichechain.niches import GridNiches
+
+__version__ = "0.1.0"
+
+# Names are imported when they are first used: NumPy, SciPy and pandas take half a second.
+_HOMES = {
+    "Archive": "archive",
+    "ArchiveError": "errors",
+    "BuildConfig": "config",
+    "Elite": "archive",
+    "Evolvability": "evolvability",
+    "GridNiches": "niches",
+    "NicheChain": "chain",
+    "NicheEvolvability": "evolvability",
+    "NichechainError": "errors",
+    "Threads": "execution",
+    "TransitionCounts": "chain",
+    "build": "building",
+    "estimate": "chain",
+    "genotype_evolvability": "evolvability",
+    "l_evolvability": "evolvability",
+    "load": "archive",
+    "niche_evolvability": "evolvability",
+}
+
+__all__ = [
+    "Archive",
+    "ArchiveError",
+    "BuildConfig",
+    "Elite",
+    "Evolvability",
+    "GridNiches",
+    "NicheChain",
+    "NicheEvolvability",
+    "NichechainError",
+    "Threads",
+    "TransitionCounts",
+    "build",
+    "domains",
+    "estimate",
+    "genotype_evolvability",
+    "l_evolvability",
+    "load",
+    "niche_evolvability",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name == "domains":
+        return importlib.import_module("nichechain.domains")
+    if name in _HOMES:
+        return getattr(importlib.import_module(f"nichechain.{_HOMES[name]}"), name)
+    raise AttributeError(f"module 'nichechain' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return __all__

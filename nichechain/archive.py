@@ -1,0 +1,213 @@
+"""An archive as its users see it: elites, births, chain."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from nichechain import domains, store, variation
+from nichechain.births import NONE
+from nichechain.chain import NicheChain, TransitionCounts, estimate
+from nichechain.config import BuildConfig
+from nichechain.domains.base import Domain
+from nichechain.errors import ArchiveError, NichechainError
+from nichechain.illumination import Elites
+from nichechain.niches import GridNiches, Niche
+
+if TYPE_CHECKING:
+    from torch import nn
+
+
+@dataclass(frozen=True)
+class Elite:
+    """The genotype that stands for a niche.
+
+    Parameters
+    ----------
+    niche : tuple of int, optional
+        Grid index of its niche; None for the elite of the outside state.
+    state : int
+        Flat id of its niche.
+    genotype : (P,) float32 array
+    behavior : (B,) float64 array
+    objective : float
+    uid : int
+        Number of its birth.
+    depth : int
+        Generations since an initial birth.
+    """
+
+    niche: tuple[int, ...] | None
+    state: int
+    genotype: NDArray[np.float32]
+    behavior: NDArray[np.float64]
+    objective: float
+    uid: int
+    depth: int
+
+
+class Archive:
+    """The last commit of an archive folder, read-only.
+
+    Parameters
+    ----------
+    folder : Path
+
+    Raises
+    ------
+    ArchiveError
+        If the folder is no archive or is damaged.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.meta = store.read_meta(folder)
+        self.config: BuildConfig = self.meta.config
+        self.niches = GridNiches(self.config.shape, self.config.bounds, self.config.outside)
+        self.elites: Elites = store.read_state(folder, self.meta).elites
+
+    def __repr__(self) -> str:
+        return (
+            f"Archive({str(self.folder)!r}: {self.filled} of {len(self.niches)} niches filled "
+            f"by {self.meta.births} births)"
+        )
+
+    @property
+    def filled(self) -> int:
+        """Niches with an elite; the outside state is not one."""
+        return int(np.count_nonzero(self.elites.niche < len(self.niches)))
+
+    @cached_property
+    def domain(self) -> Domain:
+        """The domain that the archive was built on."""
+        return domains.make(self.config.domain, seed=self.config.domain_seed)
+
+    @cached_property
+    def mutate(self) -> variation.AdditiveMutation:
+        """The mutation operator that the archive was built with."""
+        return variation.make(self.config.mutation, self.config.scale)
+
+    def elite(self, niche: Niche) -> Elite:
+        """The elite of a niche.
+
+        Raises
+        ------
+        NichechainError
+            If there is no such niche, or nobody was ever born in it.
+        """
+        state = self.niches.flat(niche)
+        row = np.searchsorted(self.elites.niche, state)
+        if row == len(self.elites) or self.elites.niche[row] != state:
+            raise NichechainError(
+                f"niche {self.niches.label(state)} is empty: "
+                f"{self.filled} of {len(self.niches)} have an elite"
+            )
+        return Elite(
+            self.niches.index(state),
+            state,
+            self.elites.genotype[row],
+            self.elites.behavior[row],
+            float(self.elites.objective[row]),
+            int(self.elites.uid[row]),
+            int(self.elites.depth[row]),
+        )
+
+    def controller(self, niche: Niche) -> nn.Module:
+        """The elite of a niche as a torch module, ready to use."""
+        return self.domain.controller(self.elite(niche).genotype)
+
+    def births(self) -> pd.DataFrame:
+        """Every evaluated child, in order; the columns of :mod:`nichechain.births`."""
+        frame = store.read_births(self.folder, self.meta).to_pandas(types_mapper=_nullable)
+        names = {f"behavior_{i}": f"behavior_{name}" for i, name in enumerate(self.domain.behavior_names)}
+        return frame.rename(columns=names)
+
+    @cached_property
+    def counts(self) -> TransitionCounts:
+        """Births from niche to niche."""
+        table = store.read_births(self.folder, self.meta)
+        parent, child = (table[name].fill_null(NONE).to_numpy() for name in ("parent_niche", "child_niche"))
+        return TransitionCounts.from_births(parent, child, self.niches)
+
+    def chain(self, estimator: str = "dirichlet", **options: Any) -> NicheChain:
+        """The Markov chain over niches, estimated from all births.
+
+        Parameters
+        ----------
+        estimator : {"dirichlet", "mle"}
+        **options
+            Of :func:`nichechain.chain.estimate`, such as ``unvisited="self"``.
+        """
+        return estimate(self.counts, estimator, **options)  # type: ignore[arg-type]
+
+
+def load(path: str | Path) -> Archive:
+    """Open an archive folder, or an archive that ships with nichechain by its name.
+
+    Parameters
+    ----------
+    path : str or Path
+        Such as ``archives/fetch-seed0`` or ``fetch-pick-and-place``.
+
+    Raises
+    ------
+    ArchiveError
+        If there is no archive there, or it is damaged.
+    """
+    folder = Path(path)
+    if not folder.exists():
+        folder = _shipped(folder) or folder
+    return Archive(folder)
+
+
+def shipped() -> tuple[str, ...]:
+    """Names of the archives that ship with nichechain."""
+    return tuple(
+        sorted(
+            {
+                entry.name
+                for root in _shipped_roots()
+                if root.is_dir()
+                for entry in root.iterdir()
+                if store.is_archive(entry)
+            }
+        )
+    )
+
+
+def _shipped(path: Path) -> Path | None:
+    """A shipped archive called by its name, with or without ``archives/`` before it."""
+    if len(path.parts) > 2 or (len(path.parts) == 2 and path.parts[0] != "archives"):
+        return None
+    for root in _shipped_roots():
+        if store.is_archive(root / path.name):
+            return root / path.name
+    if len(path.parts) == 1 and shipped():
+        raise ArchiveError(
+            f"{path} is neither a folder nor an archive that ships with nichechain ({', '.join(shipped())})"
+        )
+    return None
+
+
+def _shipped_roots() -> tuple[Path, Path]:
+    """Where a wheel puts shipped archives, and where a checkout has them."""
+    package = Path(__file__).resolve().parent
+    return package / "archives", package.parent / "archives"
+
+
+def _nullable(kind: Any) -> Any:
+    """Pandas types that keep integers whole beside nulls."""
+    import pyarrow as pa
+
+    return {
+        pa.int32(): pd.Int32Dtype(),
+        pa.int64(): pd.Int64Dtype(),
+        pa.bool_(): pd.BooleanDtype(),
+        pa.string(): pd.StringDtype(),
+    }.get(kind)

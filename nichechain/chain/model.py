@@ -1,0 +1,164 @@
+"""The chain: a transition matrix over niches, given or estimated."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy import sparse
+
+from nichechain.errors import NichechainError
+from nichechain.niches import GridNiches, Niche
+
+if TYPE_CHECKING:
+    import networkx as nx
+
+    from nichechain.chain.counts import TransitionCounts
+    from nichechain.chain.posterior import DirichletPosterior
+
+Floats = NDArray[np.float64]
+Matrix: TypeAlias = "Floats | sparse.csr_array"
+
+
+class NicheChain:
+    """A Markov chain whose states are niches: step 4 of the paper's procedure. Immutable.
+
+    Parameters
+    ----------
+    transition : (S, S) array or scipy.sparse matrix, optional
+        ``transition[i, j]`` = P(child in state j | parent in state i). Left out where there is a
+        posterior.
+    outside : int, optional
+        Number of the state of behaviors out of bounds, which must be the last; it is no niche.
+        By default there is none.
+    niches : GridNiches, optional
+        What the states are; lets niches be named by grid index.
+    posterior : DirichletPosterior, optional
+        What is known of T where it was estimated.
+    counts : TransitionCounts, optional
+        The births that T was estimated from.
+    estimator : str
+        How T came about.
+
+    Raises
+    ------
+    NichechainError
+        If the matrix is not square, not finite, negative, or a row does not sum to 1.
+    """
+
+    def __init__(
+        self,
+        transition: ArrayLike | sparse.sparray | sparse.spmatrix | None = None,
+        *,
+        outside: int | None = None,
+        niches: GridNiches | None = None,
+        posterior: DirichletPosterior | None = None,
+        counts: TransitionCounts | None = None,
+        estimator: str = "given",
+    ) -> None:
+        if (transition is None) == (posterior is None):
+            raise NichechainError("a chain needs either a transition matrix or a posterior")
+        self._given = None if transition is None else _stochastic(transition)
+        self.niches = niches
+        self.posterior = posterior
+        self.counts = counts
+        self.estimator = estimator
+        self.states: int = (
+            posterior.counts.niches.states if posterior is not None else self._given.shape[0]  # type: ignore[union-attr]
+        )
+        if outside is not None and outside != self.states - 1:
+            raise NichechainError(f"outside is {outside}, but must be the last state, {self.states - 1}")
+        self.outside = outside
+        self.n_niches = self.states - (outside is not None)
+        if niches is not None and len(niches) != self.n_niches:
+            raise NichechainError(f"T has {self.n_niches} niches, but the grid has {len(niches)}")
+
+    def __repr__(self) -> str:
+        place = "" if self.outside is None else " and outside"
+        return f"NicheChain({self.n_niches} niches{place}, estimator: {self.estimator})"
+
+    @cached_property
+    def T(self) -> Matrix:  # noqa: N802  # the paper's name
+        """The transition matrix (S, S); its posterior mean where it was estimated with one."""
+        if self._given is not None:
+            return self._given
+        assert self.posterior is not None
+        return self.posterior.mean()
+
+    @property
+    def births(self) -> NDArray[np.int64] | None:
+        """Births behind each row of T (S,), where T was estimated."""
+        return None if self.counts is None else self.counts.births
+
+    def state(self, niche: Niche) -> int:
+        """Flat id of a niche given as flat id or grid index.
+
+        Raises
+        ------
+        NichechainError
+            If there is no such niche.
+        """
+        if self.niches is not None:
+            return self.niches.flat(niche)
+        if not isinstance(niche, (int, np.integer)):
+            raise NichechainError(f"niche is {niche}, but this chain has no grid: give its number")
+        if not 0 <= niche < self.n_niches:
+            raise NichechainError(f"niche is {niche}, but this chain has niches 0 to {self.n_niches - 1}")
+        return int(niche)
+
+    def label(self, state: int) -> str:
+        """How a state is called: its grid index, its number, or ``outside``."""
+        if state == self.outside:
+            return "outside"
+        return str(state) if self.niches is None else self.niches.label(state)
+
+    def niche_evolvability(self, l: int = 5, lineages: int = 100, **options: Any) -> Floats:  # noqa: E741
+        """l-evolvability of every niche, (n_niches,).
+
+        The values of :func:`nichechain.evolvability.niche_evolvability`, which takes the same
+        options and gives intervals as well.
+        """
+        from nichechain.evolvability import niche_evolvability
+
+        return niche_evolvability(self, l=l, lineages=lineages, **options).value
+
+    def graph(self, threshold: float = 0.05) -> nx.DiGraph:
+        """The chain as a graph, see :func:`nichechain.chain.graph.reachability_graph`."""
+        from nichechain.chain.graph import reachability_graph
+
+        return reachability_graph(self, threshold)
+
+
+def _stochastic(transition: ArrayLike | sparse.sparray | sparse.spmatrix) -> Matrix:
+    """The matrix in float64, sparse if it was, after checking that it is row-stochastic."""
+    matrix: Matrix
+    if sparse.issparse(transition):
+        as_given = sparse.csr_array(transition)
+        given = as_given.dtype
+        matrix = as_given.astype(np.float64)
+        values = matrix.data
+    else:
+        array = np.asarray(transition)
+        given = array.dtype
+        try:
+            matrix = array.astype(np.float64)
+        except (TypeError, ValueError):
+            raise NichechainError(f"T has values of type {given}, but must have numbers") from None
+        values = matrix
+    if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1] or not matrix.shape[0]:
+        raise NichechainError(f"T has shape {matrix.shape}, but must be square with at least one state")
+    if not np.isfinite(values).all():
+        raise NichechainError("T has NaN or infinite values, but must have probabilities")
+    if values.size and values.min() < 0:
+        raise NichechainError(f"T has a value of {values.min():g}, but probabilities are not negative")
+    sums = np.asarray(matrix.sum(axis=1)).ravel()
+    precision = np.finfo(given).eps if np.issubdtype(given, np.floating) else np.finfo(float).eps
+    off = np.abs(sums - 1.0)
+    worst = int(np.argmax(off))
+    if off[worst] > 8 * matrix.shape[0] * precision + 1e-12:
+        raise NichechainError(f"row {worst} of T sums to {sums[worst]:.9g}, but every row must sum to 1")
+    if isinstance(matrix, np.ndarray):
+        matrix.setflags(write=False)
+    return matrix

@@ -1,0 +1,94 @@
+"""What a build is asked to do: one dataclass, which is its command line and stays with its result."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, fields
+from typing import Any, Literal
+
+from nichechain.errors import NichechainError
+
+Replacement = Literal["random", "first", "newest", "objective"]
+Outside = Literal["state", "absorb", "clip"]
+MutationName = Literal["cauchy", "gaussian", "student-t", "uniform-ball"]
+
+
+@dataclass(frozen=True)
+class BuildConfig:
+    """A MAP-Elites build ("Variation operator"; step 3 of the estimation of l-evolvability).
+
+    Parameters
+    ----------
+    domain : str
+        Name of the domain.
+    domain_seed : int
+        Seed of what the domain holds fixed, such as the block's place.
+    evaluations : int
+        Births in total, the initial ones among them.
+    shape : tuple of int
+        Cells of the grid along each axis of behavior.
+    bounds : tuple of (float, float)
+        Bounds of the grid, in units of behavior.
+    outside : {"state", "absorb", "clip"}
+        What a behavior out of bounds belongs to, see :class:`nichechain.niches.GridNiches`.
+    initial : int
+        Births without a parent.
+    batch : int
+        Children of a step; their parents are drawn from the elites before it.
+    mutation : {"cauchy", "gaussian", "student-t", "uniform-ball"}
+        Mutation operator.
+    scale : float
+        Its scale.
+    replacement : {"random", "first", "newest", "objective"}
+        Which of the births of a niche is its elite: each alike, the first, the last, or the one
+        with the largest objective.
+    seed : int
+        Seed of the run.
+
+    Raises
+    ------
+    NichechainError
+        If a value is out of range.
+    """
+
+    domain: str
+    shape: tuple[int, ...]
+    bounds: tuple[tuple[float, float], ...]
+    domain_seed: int = 0
+    evaluations: int = 6000
+    outside: Outside = "state"
+    initial: int = 100
+    batch: int = 64
+    mutation: MutationName = "cauchy"
+    scale: float = 1.0
+    replacement: Replacement = "random"
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        for name in ("evaluations", "initial", "batch"):
+            if getattr(self, name) < 1:
+                raise NichechainError(f"{name} is {getattr(self, name)}, but must be at least 1")
+        for name in ("seed", "domain_seed"):
+            if getattr(self, name) < 0:
+                raise NichechainError(f"{name} is {getattr(self, name)}, but must not be negative")
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain values for JSON."""
+        return asdict(self)
+
+    @classmethod
+    def from_json(cls, values: dict[str, Any]) -> BuildConfig:
+        """The configuration that :meth:`to_json` wrote.
+
+        Raises
+        ------
+        NichechainError
+            If a value is missing or unknown.
+        """
+        names = {field.name for field in fields(cls)}
+        if set(values) != names:
+            odd = ", ".join(sorted(set(values) ^ names))
+            raise NichechainError(f"the configuration has missing or unknown values: {odd}")
+        plain = dict(values)
+        plain["shape"] = tuple(plain["shape"])
+        plain["bounds"] = tuple((low, high) for low, high in plain["bounds"])
+        return cls(**plain)

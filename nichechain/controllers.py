@@ -1,0 +1,203 @@
+"""Neural-network controllers: flat genotypes and torch modules, one into the other."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from nichechain.errors import NichechainError
+
+if TYPE_CHECKING:
+    from torch import nn
+
+Float32s = NDArray[np.float32]
+
+IDENTITY, RELU, TANH = 0, 1, 2
+_ACTIVATIONS = {"identity": IDENTITY, "relu": RELU, "tanh": TANH}
+
+
+# ln 2 in two parts: the first has so few digits that its product with a small integer is exact.
+LN2_HIGH = 6.93147180369123816490e-01
+LN2_LOW = 1.90821492927058770002e-10
+INVERSE_LN2 = 1.4426950408889634
+# Below, the cubic term of tanh is under half a unit in the last place of a float32; above, 1 is
+# the nearest float32.
+TANH_LINEAR, TANH_SATURATED = 1e-4, 9.5
+EXP_TERMS = 11
+
+
+def tanh(values: Float32s) -> Float32s:
+    """Hyperbolic tangent in float32, made of operations that IEEE 754 rounds in one way only.
+
+    Maths libraries and vector units differ in the last bit of tanh; this does not, so archives
+    replay to the bit on another machine. In error by at most one unit in the last place.
+
+    Parameters
+    ----------
+    values : float32 array
+
+    Returns
+    -------
+    float32 array of the same shape
+    """
+    size = np.abs(values.astype(np.float64))
+    doubled = 2.0 * np.minimum(size, TANH_SATURATED)
+    # e^doubled = 2^k e^r with |r| <= ln(2)/2, where eleven terms of the series leave 1e-14.
+    k = np.floor(doubled * INVERSE_LN2 + 0.5)
+    r = (doubled - k * LN2_HIGH) - k * LN2_LOW
+    series = np.ones_like(r)
+    for n in range(EXP_TERMS, 0, -1):
+        series = 1.0 + series * r / n
+    power = np.ldexp(series, np.nan_to_num(k).astype(np.int64))
+    result = np.copysign(1.0 - 2.0 / (power + 1.0), values).astype(np.float32)
+    return np.where(size < TANH_LINEAR, values, result)
+
+
+@dataclass(frozen=True)
+class MLP:
+    """A fully connected network and the layout of its genotype.
+
+    Parameters
+    ----------
+    sizes : tuple of int
+        Units of the input, of every hidden layer and of the output.
+    hidden, output : {"relu", "tanh", "identity"}
+        Activations of the hidden layers and of the output.
+    evolve_biases : bool
+        Whether biases are part of the genotype. By default they stay 0: the paper starts them
+        there and says that "only the weights are updated".
+
+    Notes
+    -----
+    A genotype is float32. It holds, layer after layer, the weight matrix (outputs, inputs) in C
+    order, followed by the biases if they evolve: the order of ``module.parameters()``.
+    """
+
+    sizes: tuple[int, ...] = (25, 32, 32, 4)
+    hidden: str = "relu"
+    output: str = "tanh"
+    evolve_biases: bool = False
+
+    def __post_init__(self) -> None:
+        if len(self.sizes) < 2 or min(self.sizes) < 1:
+            raise NichechainError(f"layer sizes are {self.sizes}, but two or more positive ones are needed")
+        for name in (self.hidden, self.output):
+            if name not in _ACTIVATIONS:
+                raise NichechainError(f"activation is {name!r}, but must be one of {', '.join(_ACTIVATIONS)}")
+
+    @property
+    def genotype_length(self) -> int:
+        """Number of evolved parameters."""
+        weights = sum(a * b for a, b in zip(self.sizes, self.sizes[1:], strict=False))
+        return weights + (sum(self.sizes[1:]) if self.evolve_biases else 0)
+
+    @property
+    def activations(self) -> NDArray[np.int64]:
+        """Activation code of every layer."""
+        names = [self.hidden] * (len(self.sizes) - 2) + [self.output]
+        return np.array([_ACTIVATIONS[name] for name in names], np.int64)
+
+    def parameters(self, genotype: ArrayLike) -> Float32s:
+        """All weights and biases, flat: the genotype with the fixed biases put in.
+
+        Raises
+        ------
+        NichechainError
+            If the genotype has the wrong length.
+        """
+        flat = np.ascontiguousarray(genotype, np.float32)
+        if flat.shape != (self.genotype_length,):
+            raise NichechainError(
+                f"genotype has shape {flat.shape}, but this controller's has ({self.genotype_length},)"
+            )
+        if self.evolve_biases:
+            return flat
+        parts = []
+        start = 0
+        for inputs, outputs in zip(self.sizes, self.sizes[1:], strict=False):
+            parts += [flat[start : start + inputs * outputs], np.zeros(outputs, np.float32)]
+            start += inputs * outputs
+        return np.concatenate(parts)
+
+    def actions(self, genotype: ArrayLike, observations: ArrayLike) -> Float32s:
+        """Actions of the controller for a batch of observations.
+
+        Parameters
+        ----------
+        genotype : (genotype_length,) array
+        observations : (N, sizes[0]) array
+            Rounded to float32 before anything else.
+
+        Returns
+        -------
+        (N, sizes[-1]) float32 array
+
+        Notes
+        -----
+        Every sum runs over the inputs in order and :func:`tanh` is made of basic operations, so
+        a row's bits depend on neither the batch nor the machine, and the native engine has the
+        same. The torch module of :meth:`module` sums in another order: equal up to rounding.
+        """
+        units = np.asarray(observations, np.float32)
+        if units.ndim != 2 or units.shape[1] != self.sizes[0]:
+            raise NichechainError(f"observations have shape {units.shape}, but must be (N, {self.sizes[0]})")
+        flat = self.parameters(genotype)
+        start = 0
+        for code, inputs, outputs in zip(self.activations, self.sizes, self.sizes[1:], strict=False):
+            weight = flat[start : start + outputs * inputs].reshape(outputs, inputs)
+            start += outputs * inputs
+            total = np.repeat(flat[None, start : start + outputs], len(units), axis=0)
+            start += outputs
+            for j in range(inputs):
+                total += weight[:, j] * units[:, j : j + 1]
+            units = np.maximum(total, 0) if code == RELU else tanh(total) if code == TANH else total
+        return units
+
+    def sample(self, n: int, seed: int | np.random.Generator) -> Float32s:
+        """Genotypes with Xavier normal weights and biases 0.
+
+        Drawn one after another, so the first k of n are the k that ``sample(k, seed)`` gives.
+
+        Parameters
+        ----------
+        n : int
+            Number of genotypes.
+        seed : int or numpy.random.Generator
+
+        Returns
+        -------
+        (n, genotype_length) float32 array
+        """
+        import torch
+
+        generator = torch.Generator().manual_seed(int(np.random.default_rng(seed).integers(2**63)))
+        genotypes = np.empty((n, self.genotype_length), np.float32)
+        for row in genotypes:
+            start = 0
+            for inputs, outputs in zip(self.sizes, self.sizes[1:], strict=False):
+                weight = torch.empty(outputs, inputs)
+                torch.nn.init.xavier_normal_(weight, generator=generator)
+                row[start : start + inputs * outputs] = weight.numpy().ravel()
+                start += inputs * outputs
+                if self.evolve_biases:
+                    row[start : start + outputs] = 0.0
+                    start += outputs
+        return genotypes
+
+    def module(self, genotype: ArrayLike) -> nn.Sequential:
+        """The controller as a torch module, with the genotype's weights."""
+        import torch
+        from torch import nn
+
+        modules: dict[str, Any] = {"relu": nn.ReLU, "tanh": nn.Tanh, "identity": nn.Identity}
+        layers: list[nn.Module] = []
+        for inputs, outputs in zip(self.sizes, self.sizes[1:], strict=False):
+            layers += [nn.Linear(inputs, outputs), modules[self.hidden]()]
+        layers[-1] = modules[self.output]()
+        network = nn.Sequential(*layers)
+        flat = torch.from_numpy(self.parameters(genotype).copy())
+        nn.utils.vector_to_parameters(flat, network.parameters())
+        return network

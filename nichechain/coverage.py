@@ -1,0 +1,246 @@
+"""How many niches independent lineages visit: in closed form, by simulation, by rarefaction."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy import sparse
+from scipy.special import gammaln
+
+from nichechain.errors import NichechainError
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+# Cells of the table (repeats, niches) and walks in flight that a simulation keeps at once.
+_SIMULATION_CELLS = 8_000_000
+
+
+class LinearMap(Protocol):
+    """A matrix we only multiply with: sparse, dense, or sparse plus low rank."""
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Rows and columns."""
+        ...
+
+    def __matmul__(self, other: Floats, /) -> Floats: ...
+
+
+def expected_coverage(
+    transition: LinearMap,
+    first: LinearMap,
+    generations: int,
+    lineages: ArrayLike,
+    *,
+    counted: int | None = None,
+    columns: int = 128,
+) -> Floats:
+    """Expected number of distinct niches that independent lineages visit: l-evolvability.
+
+    Parameters
+    ----------
+    transition : (S, S) row-stochastic map
+        ``transition[i, j]`` = P(child in state j | parent in state i).
+    first : (m, S) map
+        Distribution of generation 1 for each of m roots; ``transition`` itself for all states.
+    generations : int
+        Length l of a lineage, at least 1.
+    lineages : int or (k,) ints
+        Number U of independent lineages per root, at least 1; several are answered together.
+    counted : int, optional
+        Only the first so many states are niches that count; by default all are.
+    columns : int
+        Target niches treated together. Peak memory is about ``16 * (S + m) * columns`` bytes.
+
+    Returns
+    -------
+    (m,) or (m, k) array
+        Niches visited at least once, in expectation.
+
+    Raises
+    ------
+    NichechainError
+        If ``generations`` or ``lineages`` is below 1.
+
+    Notes
+    -----
+    E = Σ_j 1 − (1 − h_j)^U, where h_j is the probability that one lineage
+    visits niche j.
+    """
+    sizes = np.atleast_1d(np.asarray(lineages))
+    check_lengths(generations, int(sizes.min()))
+    coverage = np.zeros((first.shape[0], sizes.size))
+    for _, visited in visit_probabilities(transition, first, generations, counted, columns):
+        for k, size in enumerate(sizes):
+            coverage[:, k] += _at_least_once(visited, int(size)).sum(axis=1)
+    return coverage if np.ndim(lineages) else coverage[:, 0]
+
+
+def visit_probabilities(
+    transition: LinearMap,
+    first: LinearMap,
+    generations: int,
+    counted: int | None = None,
+    columns: int = 128,
+) -> Iterator[tuple[Ints, Floats]]:
+    """Probabilities h that one lineage visits each niche, a block of niches at a time.
+
+    Yields
+    ------
+    (c,) int64 array and (m, c) float64 array
+        Some niches, and h for each of the m roots.
+
+    Notes
+    -----
+    With H_k[i, j] = P(j is i or occurs within k transitions from i), conditioning on the first
+    transition gives H_k = T · H_{k−1} with its diagonal set to 1. Columns of H do not depend on
+    each other, so a block of them at a time bounds the memory.
+    """
+    states = transition.shape[0]
+    niches = states if counted is None else counted
+    for start in range(0, niches, columns):
+        targets = np.arange(start, min(start + columns, niches))
+        hit = np.zeros((states, targets.size))
+        hit[targets, targets - start] = 1.0
+        for _ in range(generations - 1):
+            hit = transition @ hit
+            # A lineage that stands on its target has visited it, wherever it goes next.
+            hit[targets, targets - start] = 1.0
+        yield targets, first @ hit
+
+
+def sampled_coverage(
+    transition: sparse.csr_array | Floats,
+    first: Floats,
+    generations: int,
+    lineages: int,
+    repeats: int,
+    rng: np.random.Generator,
+    *,
+    counted: int | None = None,
+) -> Ints:
+    """Numbers of niches visited in simulations: the paper's procedure, steps 5 to 7.
+
+    Parameters
+    ----------
+    transition : (S, S) row-stochastic matrix
+    first : (S,) array
+        Distribution of generation 1.
+    generations, lineages : int
+        Length and number of the walks of one repeat, at least 1.
+    repeats : int
+        How often to repeat, at least 1.
+    rng : numpy.random.Generator
+    counted : int, optional
+        Only the first so many states are niches that count; by default all are.
+
+    Returns
+    -------
+    (repeats,) int64 array
+
+    Raises
+    ------
+    NichechainError
+        If a number is below 1.
+    """
+    check_lengths(generations, lineages)
+    if repeats < 1:
+        raise NichechainError(f"repeats is {repeats}, but at least 1 is needed")
+    states = transition.shape[0]
+    niches = states if counted is None else counted
+    step = _RowSampler(sparse.csr_array(transition))
+    start = _RowSampler(sparse.csr_array(first[None, :]))
+    at_once = max(1, _SIMULATION_CELLS // max(states, lineages))
+    found = []
+    for done in range(0, repeats, at_once):
+        size = min(at_once, repeats - done)
+        repeat = np.repeat(np.arange(size), lineages)
+        seen = np.zeros((size, states), bool)
+        here = start.draw(np.zeros(size * lineages, np.int64), rng)
+        seen[repeat, here] = True
+        for _ in range(generations - 1):
+            here = step.draw(here, rng)
+            seen[repeat, here] = True
+        found.append(np.count_nonzero(seen[:, :niches], axis=1))
+    return np.concatenate(found)
+
+
+def rarefied_coverage(counts: ArrayLike, size: int, *, counted: int | None = None) -> float:
+    """Expected number of niches among ``size`` of the offspring, drawn without replacement.
+
+    Parameters
+    ----------
+    counts : (S,) ints
+        Offspring observed in each state.
+    size : int
+        Between 1 and their sum.
+    counted : int, optional
+        Only the first so many states are niches that count; by default all are.
+
+    Returns
+    -------
+    float
+        The observed number of niches, exactly, where ``size`` is the sum.
+
+    Raises
+    ------
+    NichechainError
+        If ``size`` is out of range.
+
+    Notes
+    -----
+    E = Σ_j 1 − C(m − c_j, U) / C(m, U); Hurlbert (1971), "The nonconcept of species diversity".
+    """
+    observed = np.asarray(counts, np.int64)
+    total = int(observed.sum())
+    if not 1 <= size <= total:
+        raise NichechainError(f"size is {size}, but must be between 1 and the {total} offspring observed")
+    niches = observed[:counted]
+    others = total - niches[niches > 0]
+    possible = others[others >= size].astype(np.float64)
+    log_missed = (
+        gammaln(possible + 1) - gammaln(possible - size + 1) - gammaln(total + 1) + gammaln(total - size + 1)
+    )
+    return float(others.size - np.exp(log_missed).sum())
+
+
+def check_lengths(generations: int, lineages: int) -> None:
+    """Refuse a lineage without generations, or none at all."""
+    if generations < 1:
+        raise NichechainError(f"l is {generations}, but a lineage has at least 1 generation")
+    if lineages < 1:
+        raise NichechainError(f"lineages is {lineages}, but at least 1 is needed")
+
+
+def _at_least_once(probability: Floats, trials: int) -> Floats:
+    """P(an event of this probability happens in at least one of the trials)."""
+    # log1p and expm1 keep the digits of a tiny probability, which 1 - (1 - h)**U rounds away.
+    with np.errstate(divide="ignore"):
+        some: Floats = -np.expm1(trials * np.log1p(-np.minimum(probability, 1.0)))
+    return some
+
+
+class _RowSampler:
+    """Draws columns of a row-stochastic matrix by inverting its rows' distribution functions."""
+
+    def __init__(self, matrix: sparse.csr_array) -> None:
+        matrix = matrix.copy()
+        matrix.eliminate_zeros()
+        sizes = np.diff(matrix.indptr)
+        rows = np.repeat(np.arange(matrix.shape[0]), sizes)
+        before = np.concatenate([[0.0], np.cumsum(matrix.data)])
+        within = before[1:] - before[matrix.indptr[:-1]][rows]
+        total = np.bincount(rows, matrix.data, matrix.shape[0])
+        # Row i fills the interval from i to i + 1, so one sorted search serves all rows.
+        self._upper = rows + within / total[rows]
+        self._upper[matrix.indptr[1:][sizes > 0] - 1] = np.flatnonzero(sizes) + 1.0
+        self._columns = matrix.indices
+
+    def draw(self, rows: Ints, rng: np.random.Generator) -> Ints:
+        found = np.searchsorted(self._upper, rows + rng.random(rows.size), side="right")
+        drawn: Ints = self._columns[found].astype(np.int64)
+        return drawn

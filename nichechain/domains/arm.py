@@ -1,0 +1,76 @@
+"""A planar arm, the small standard task of the quality-diversity community."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from nichechain.domains.base import Evaluation, check_genotypes
+
+if TYPE_CHECKING:
+    from torch import nn
+
+
+class PlanarArm:
+    """An arm of equal links that sum to 1, in closed form; behavior is where its hand is.
+
+    Parameters
+    ----------
+    joints : int
+        Number of joints.
+    seed : int
+        Unused by the arm, which has nothing random; part of every domain.
+
+    Notes
+    -----
+    A genotype holds the angle of each joint to the link before it, in radians. The objective is
+    minus the variance of the angles, as in the arm repertoire of Cully et al. (2015): of two
+    postures with the same hand, the smoother is better.
+    """
+
+    name = "arm"
+    behavior_names = ("x", "y")
+    unit = "arm lengths"
+    bounds = ((-1.0, 1.0), (-1.0, 1.0))
+    chunk = 4096
+
+    def __init__(self, joints: int = 10, *, seed: int = 0) -> None:
+        self.genotype_length = int(joints)
+        self.seed = int(seed)
+
+    def __repr__(self) -> str:
+        return f"PlanarArm(joints={self.genotype_length}, seed={self.seed})"
+
+    @property
+    def start(self) -> NDArray[np.float64]:
+        """The hand of the stretched arm, (2,)."""
+        return np.array([1.0, 0.0])
+
+    def sample(self, n: int, *, seed: int | np.random.Generator) -> NDArray[np.float32]:
+        """Angles uniform in [-0.1, 0.1] radians, (n, joints): a nearly stretched arm."""
+        rng = np.random.default_rng(seed)
+        return rng.uniform(-0.1, 0.1, (n, self.genotype_length)).astype(np.float32)
+
+    def evaluate(self, genotypes: ArrayLike) -> Evaluation:
+        """Position of the hand for each genotype (N, joints)."""
+        angles = check_genotypes(genotypes, self.genotype_length).astype(np.float64)
+        failed: NDArray[np.bool_] = np.logical_not(np.isfinite(angles).all(axis=1))
+        directions = np.cumsum(np.where(failed[:, None], 0.0, angles), axis=1)
+        hand = np.stack([np.cos(directions).mean(axis=1), np.sin(directions).mean(axis=1)], axis=1)
+        objective = -np.where(failed[:, None], 0.0, angles).var(axis=1)
+        hand[failed] = np.nan
+        objective[failed] = np.nan
+        reasons = tuple("genotype is not finite" if bad else "" for bad in failed)
+        return Evaluation(hand, objective, failed, reasons)
+
+    def controller(self, genotype: ArrayLike) -> nn.Module:  # noqa: ARG002
+        """An arm has no controller.
+
+        Raises
+        ------
+        TypeError
+            Always.
+        """
+        raise TypeError("a planar arm has joint angles, not a controller")

@@ -1,0 +1,127 @@
+"""What a domain is: a behavior function φ over genotypes, pure and batched."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Protocol, runtime_checkable
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from nichechain.errors import NichechainError
+
+if TYPE_CHECKING:
+    from torch import nn
+
+Floats = NDArray[np.float64]
+Float32s = NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """What became of N genotypes.
+
+    Parameters
+    ----------
+    behavior : (N, B) float64 array
+        NaN in the rows that failed.
+    objective : (N,) float64 array
+        Larger is better; NaN in the rows that failed.
+    failed : (N,) bool array
+    reasons : tuple of str
+        Why each row failed; empty where it did not.
+    """
+
+    behavior: Floats
+    objective: Floats
+    failed: NDArray[np.bool_]
+    reasons: tuple[str, ...]
+
+    def __len__(self) -> int:
+        return len(self.objective)
+
+    @staticmethod
+    def concatenate(parts: Sequence[Evaluation]) -> Evaluation:
+        """The rows of several evaluations, in order."""
+        return Evaluation(
+            np.concatenate([part.behavior for part in parts]),
+            np.concatenate([part.objective for part in parts]),
+            np.concatenate([part.failed for part in parts]),
+            tuple(reason for part in parts for reason in part.reasons),
+        )
+
+
+@runtime_checkable
+class Domain(Protocol):
+    """A behavior function with what a search needs to know of it.
+
+    ``evaluate`` is pure: the same genotype gives the same bits, whatever else is in the batch and
+    however many threads call it at once.
+    """
+
+    @property
+    def name(self) -> str:
+        """Name on the command line."""
+        ...
+
+    @property
+    def seed(self) -> int:
+        """Seed of what the domain holds fixed."""
+        ...
+
+    @property
+    def genotype_length(self) -> int:
+        """Number of evolved parameters."""
+        ...
+
+    @property
+    def behavior_names(self) -> tuple[str, ...]:
+        """One name per axis of behavior."""
+        ...
+
+    @property
+    def unit(self) -> str:
+        """Unit of behavior, such as m."""
+        ...
+
+    @property
+    def bounds(self) -> tuple[tuple[float, float], ...]:
+        """Default bounds of a grid over behavior."""
+        ...
+
+    @property
+    def chunk(self) -> int:
+        """Genotypes worth handing to a worker at once."""
+        ...
+
+    @property
+    def start(self) -> Floats | None:
+        """Behavior of doing nothing (B,), where there is such a thing: marked in figures."""
+        ...
+
+    def sample(self, n: int, *, seed: int | np.random.Generator) -> Float32s:
+        """Initial genotypes, (n, genotype_length); the first k of n are ``sample(k, seed=seed)``."""
+        ...
+
+    def evaluate(self, genotypes: ArrayLike) -> Evaluation:
+        """Behavior of each of N genotypes (N, genotype_length)."""
+        ...
+
+    def controller(self, genotype: ArrayLike) -> nn.Module:
+        """The genotype as something to use outside nichechain."""
+        ...
+
+
+def check_genotypes(genotypes: ArrayLike, length: int) -> Float32s:
+    """Genotypes as a float32 array (N, length).
+
+    Raises
+    ------
+    NichechainError
+        If the shape does not fit.
+    """
+    array = np.ascontiguousarray(genotypes, np.float32)
+    if array.ndim != 2 or array.shape[1] != length:
+        raise NichechainError(f"genotypes have shape {array.shape}, but must be (N, {length})")
+    return array

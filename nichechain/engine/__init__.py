@@ -1,0 +1,1 @@
+"""The native rollout: whole closed-loop episodes without the GIL."""

@@ -1,0 +1,230 @@
+"""Fetch episodes: natively where possible, else by stepping the environment; the same bits."""
+
+from __future__ import annotations
+
+import contextlib
+import copy
+import io
+import warnings
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nichechain.controllers import MLP
+
+if TYPE_CHECKING:
+    import mujoco
+
+# Warnings after which a state no longer follows from the last by the laws of the model.
+_FATAL_WARNINGS = ("CONTACTFULL", "CNSTRFULL", "BADQPOS", "BADQVEL", "BADQACC")
+
+
+@dataclass(frozen=True)
+class Episode:
+    """What a policy saw and did.
+
+    Parameters
+    ----------
+    observations : (steps + 1, inputs) float64 array
+        From the reset to the state after the last action.
+    actions : (steps, 4) float32 array
+    failure : str
+        Why the physics cannot be trusted; empty where it can.
+    """
+
+    observations: NDArray[np.float64]
+    actions: NDArray[np.float32]
+    failure: str
+
+
+class FetchEpisodes(Protocol):
+    """Runs episodes from one reset state."""
+
+    inputs: int
+    goal: NDArray[np.float64]
+
+    def run(self, controller: MLP, genotype: NDArray[np.float32], steps: int) -> Episode:
+        """One episode; safe to call from several threads."""
+        ...
+
+
+def fetch_episodes(env_id: str, seed: int) -> FetchEpisodes:
+    """The fastest way this machine has to run episodes of a Fetch environment.
+
+    Parameters
+    ----------
+    env_id : str
+        A Fetch environment of gymnasium-robotics.
+    seed : int
+        Seed of the environment's reset.
+    """
+    try:
+        return NativeFetch(env_id, seed)
+    except (ImportError, OSError, AttributeError, RuntimeError) as error:
+        warnings.warn(
+            f"episodes are stepped through Gymnasium, which is slower: {error}", RuntimeWarning, stacklevel=2
+        )
+        return SteppedFetch(env_id, seed)
+
+
+class SteppedFetch:
+    """Episodes through ``env.step``: the reference, and the fallback.
+
+    Parameters
+    ----------
+    env_id : str
+    seed : int
+        Seed of the environment's reset.
+    """
+
+    def __init__(self, env_id: str, seed: int) -> None:
+        self._env_id = env_id
+        self._seed = seed
+        self._idle = [_make(env_id)]
+        first, _ = self._idle[0].reset(seed=seed)
+        self.inputs = int(first["observation"].size)
+        self.goal = np.array(first["desired_goal"])
+
+    def run(self, controller: MLP, genotype: NDArray[np.float32], steps: int) -> Episode:
+        """One episode; every thread has an environment of its own."""
+        # list.pop and list.append are atomic, so the list is a pool without a lock.
+        env = self._idle.pop() if self._idle else _make(self._env_id)
+        observation, _ = env.reset(seed=self._seed)
+        observations = [observation["observation"]]
+        actions = np.empty((steps, controller.sizes[-1]), np.float32)
+        for t in range(steps):
+            actions[t] = controller.actions(genotype, observations[-1][None])[0]
+            observation, *_ = env.step(actions[t])
+            observations.append(observation["observation"])
+        failure = _failure(env.unwrapped.data)
+        self._idle.append(env)
+        return Episode(np.array(observations), actions, failure)
+
+
+class NativeFetch:
+    """Episodes as one compiled call each, without the GIL (see :mod:`nichechain.engine.episode`).
+
+    Parameters
+    ----------
+    env_id : str
+    seed : int
+        Seed of the environment's reset.
+
+    Raises
+    ------
+    NativeUnavailableError
+        If this machine lacks what the engine needs.
+    """
+
+    def __init__(self, env_id: str, seed: int) -> None:
+        from nichechain.engine import episode, libraries
+
+        self._run = episode.run
+        self._functions = libraries.load().as_array()
+        env = _make(env_id)
+        observation, _ = env.reset(seed=seed)
+        self.inputs = int(observation["observation"].size)
+        self.goal = np.array(observation["desired_goal"])
+        unwrapped = env.unwrapped
+        self._model: mujoco.MjModel = unwrapped.model
+        self._start = copy.copy(unwrapped.data)
+        self._blocked = bool(unwrapped.block_gripper)
+        self._substeps = int(unwrapped.n_substeps)
+        self._dt = float(unwrapped.dt)
+        self._ids, self._actuator_qpos = _addresses(self._model, unwrapped._model_names.joint_names)
+        self._idle: list[mujoco.MjData] = []
+
+    def run(self, controller: MLP, genotype: NDArray[np.float32], steps: int) -> Episode:
+        """One episode; every thread has an mjData of its own."""
+        import mujoco
+
+        # list.pop and list.append are atomic, so the list is a pool without a lock.
+        data = self._idle.pop() if self._idle else mujoco.MjData(self._model)
+        observations = np.empty((steps + 1, self.inputs))
+        actions = np.empty((steps, controller.sizes[-1]), np.float32)
+        self._run(
+            self._functions,
+            self._model._address,
+            data._address,
+            self._start._address,
+            (
+                data.qpos,
+                data.qvel,
+                data.ctrl,
+                data.mocap_pos,
+                data.mocap_quat,
+                data.xpos,
+                data.xquat,
+                data.site_xpos,
+                data.site_xmat,
+            ),
+            self._ids,
+            self._actuator_qpos,
+            self._blocked,
+            self._substeps,
+            self._dt,
+            controller.parameters(genotype),
+            np.array(controller.sizes),
+            controller.activations,
+            observations,
+            actions,
+        )
+        failure = _failure(data)
+        self._idle.append(data)
+        return Episode(observations, actions, failure)
+
+
+def _make(env_id: str) -> Any:
+    """The environment, without the checks and limits that its steps do not need."""
+    import gymnasium
+
+    # On import it prints a notice about environments of another family.
+    with contextlib.redirect_stderr(io.StringIO()):
+        import gymnasium_robotics
+
+    gymnasium.register_envs(gymnasium_robotics)
+    return gymnasium.make(env_id, disable_env_checker=True)
+
+
+def _addresses(
+    model: mujoco.MjModel, joint_names: tuple[str, ...]
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """The arguments ``ids`` and ``actuator_qpos`` of :func:`nichechain.engine.episode.run`."""
+    import mujoco
+
+    def site(name: str) -> int:
+        return int(mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SITE, name))
+
+    fingers = [model.joint(name).id for name in joint_names if name.startswith("robot")][-2:]
+    welds = np.flatnonzero(model.eq_type == mujoco.mjtEq.mjEQ_WELD)
+    if model.nmocap != 1 or len(welds) != 1:
+        raise RuntimeError("the native engine knows models with one mocap body and one weld")
+    first, second = model.eq_obj1id[welds[0]], model.eq_obj2id[welds[0]]
+    welded = second if model.body_mocapid[first] != -1 else first
+    ids = [
+        site("robot0:grip"),
+        site("object0"),
+        *(model.jnt_dofadr[joint] for joint in fingers),
+        *(model.jnt_qposadr[joint] for joint in fingers),
+        welded,
+    ]
+    targets = [
+        -1 if bias == 0 else model.jnt_qposadr[joint]
+        for bias, joint in zip(model.actuator_biastype, model.actuator_trnid[:, 0], strict=True)
+    ]
+    return np.array(ids, np.int64), np.array(targets, np.int64)
+
+
+def _failure(data: mujoco.MjData) -> str:
+    """Names of MuJoCo's warnings in this episode that make its result meaningless."""
+    counts = data.warning.number
+    if not counts.any():
+        return ""
+    import mujoco
+
+    names = [
+        name for name in _FATAL_WARNINGS if counts[int(getattr(mujoco.mjtWarning, f"mjWARN_{name}"))] > 0
+    ]
+    return f"unstable physics ({', '.join(names)})" if names else ""
