@@ -58,6 +58,8 @@ class Archive:
     Parameters
     ----------
     folder : Path
+    domain : Domain, optional
+        What it was built on, where nichechain does not know it by name.
 
     Raises
     ------
@@ -65,8 +67,9 @@ class Archive:
         If the folder is no archive or is damaged.
     """
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, domain: Domain | None = None) -> None:
         self.folder = folder
+        self._domain = domain
         self.meta = store.read_meta(folder)
         self.config: BuildConfig = self.meta.config
         self.niches = GridNiches(self.config.shape, self.config.bounds, self.config.outside)
@@ -86,7 +89,7 @@ class Archive:
     @cached_property
     def domain(self) -> Domain:
         """The domain that the archive was built on."""
-        return domains.make(self.config.domain, seed=self.config.domain_seed)
+        return self._domain or domains.make(self.config.domain, seed=self.config.domain_seed)
 
     @cached_property
     def mutate(self) -> variation.AdditiveMutation:
@@ -125,7 +128,7 @@ class Archive:
     def births(self) -> pd.DataFrame:
         """Every evaluated child, in order; the columns of :mod:`nichechain.births`."""
         frame = store.read_births(self.folder, self.meta).to_pandas(types_mapper=_nullable)
-        names = {f"behavior_{i}": f"behavior_{name}" for i, name in enumerate(self.domain.behavior_names)}
+        names = {f"behavior_{i}": f"behavior_{name}" for i, name in enumerate(self.meta.facts.behavior_names)}
         return frame.rename(columns=names)
 
     @cached_property
@@ -147,13 +150,15 @@ class Archive:
         return estimate(self.counts, estimator, **options)  # type: ignore[arg-type]
 
 
-def load(path: str | Path) -> Archive:
+def load(path: str | Path, *, domain: Domain | None = None) -> Archive:
     """Open an archive folder, or an archive that ships with nichechain by its name.
 
     Parameters
     ----------
     path : str or Path
         Such as ``archives/fetch-seed0`` or ``fetch-pick-and-place``.
+    domain : Domain, optional
+        What it was built on, where nichechain does not know it by name.
 
     Raises
     ------
@@ -163,7 +168,7 @@ def load(path: str | Path) -> Archive:
     folder = Path(path)
     if not folder.exists():
         folder = _shipped(folder) or folder
-    return Archive(folder)
+    return Archive(folder, domain)
 
 
 def shipped() -> tuple[str, ...]:

@@ -87,7 +87,7 @@ def build(
             outside = _count(rows, len(niches))
             failed = rows["failed"].length() - rows["failed"].null_count
         search = MapElites(domain, niches, mutate, config, state)
-        writer = store.Writer(folder, config)
+        writer = store.Writer(folder, config, store.DomainFacts.of(domain))
 
         under_way = 0
 

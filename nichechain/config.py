@@ -54,7 +54,7 @@ class BuildConfig:
     shape: tuple[int, ...]
     bounds: tuple[tuple[float, float], ...]
     domain_seed: int = 0
-    evaluations: int = 6000
+    evaluations: int = 8000
     outside: Outside = "state"
     initial: int = 100
     batch: int = 64

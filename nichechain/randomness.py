@@ -31,6 +31,10 @@ class Purpose(IntEnum):
     """A child made to measure its parent's evolvability; index: its number."""
     FIRST_GENERATION = 7
     """A draw of D, the distribution of a genotype's children; index: its number."""
+    RUN = 8
+    """Seed of one of many runs of a configuration; index: the number of the run."""
+    NOVELTY_ARCHIVE = 9
+    """Which births enter a novelty archive; index: the step."""
 
 
 def keyed(seed: int, purpose: Purpose, index: int = 0) -> np.random.Generator:

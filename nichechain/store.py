@@ -23,7 +23,7 @@ import json
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -31,9 +31,10 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from nichechain import births
+from nichechain import __version__, births
 from nichechain.births import Offspring
 from nichechain.config import BuildConfig
+from nichechain.domains.base import Domain
 from nichechain.errors import ArchiveError
 from nichechain.illumination import Elites, SearchState
 
@@ -44,12 +45,45 @@ _BIRTHS = "births"
 
 
 @dataclass(frozen=True)
+class DomainFacts:
+    """What figures need to know of a domain, kept so that they need not load it.
+
+    Parameters
+    ----------
+    behavior_names : tuple of str
+    unit : str
+        Unit of behavior.
+    objective_name : str
+        What the objective is, with its unit.
+    start : tuple of float, optional
+        Behavior of doing nothing, where there is such a thing.
+    """
+
+    behavior_names: tuple[str, ...]
+    unit: str
+    objective_name: str
+    start: tuple[float, ...] | None
+
+    @classmethod
+    def of(cls, domain: Domain) -> DomainFacts:
+        """The facts of a domain."""
+        start = domain.start
+        return cls(
+            domain.behavior_names,
+            domain.unit,
+            domain.objective_name,
+            None if start is None else tuple(start.tolist()),
+        )
+
+
+@dataclass(frozen=True)
 class Meta:
     """What ``meta.json`` says.
 
     Parameters
     ----------
     config : BuildConfig
+    facts : DomainFacts
     versions : dict
         Version of every library that shapes the results.
     births, step : int
@@ -61,6 +95,7 @@ class Meta:
     """
 
     config: BuildConfig
+    facts: DomainFacts
     versions: dict[str, str]
     births: int
     step: int
@@ -97,8 +132,16 @@ def read_meta(folder: Path) -> Meta:
             raise ArchiveError(
                 f"{path} has format {values['format']}, but this version reads format {FORMAT}"
             )
+        facts = values["domain"]
+        start = facts["start"]
         return Meta(
             BuildConfig.from_json(values["config"]),
+            DomainFacts(
+                tuple(facts["behavior_names"]),
+                str(facts["unit"]),
+                str(facts["objective_name"]),
+                None if start is None else tuple(float(x) for x in start),
+            ),
             values["versions"],
             int(values["births"]),
             int(values["step"]),
@@ -149,11 +192,13 @@ class Writer:
     folder : Path
         Its archive, if it holds one, is continued.
     config : BuildConfig
+    facts : DomainFacts
     """
 
-    def __init__(self, folder: Path, config: BuildConfig) -> None:
+    def __init__(self, folder: Path, config: BuildConfig, facts: DomainFacts) -> None:
         self._folder = folder
         self._config = config
+        self._facts = facts
         self._full: list[dict[str, Any]] = []
         self._tail = births.schema(len(config.shape)).empty_table()
         if is_archive(folder):
@@ -186,6 +231,7 @@ class Writer:
         meta = {
             "format": FORMAT,
             "config": self._config.to_json(),
+            "domain": asdict(self._facts),
             "versions": library_versions(),
             "births": state.births,
             "step": state.step,
@@ -253,8 +299,8 @@ def library_versions() -> dict[str, str]:
     import platform
     from importlib.metadata import PackageNotFoundError, version
 
-    found = {"python": platform.python_version()}
-    for name in ("nichechain", "numpy", "torch", "mujoco", "gymnasium-robotics", "ribs"):
+    found = {"nichechain": __version__, "python": platform.python_version()}
+    for name in ("numpy", "numba", "torch", "mujoco", "gymnasium-robotics", "ribs"):
         try:
             found[name] = version(name)
         except PackageNotFoundError:

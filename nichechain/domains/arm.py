@@ -33,6 +33,7 @@ class PlanarArm:
     name = "arm"
     behavior_names = ("x", "y")
     unit = "arm lengths"
+    objective_name = "minus the variance of the joint angles (rad²)"
     bounds = ((-1.0, 1.0), (-1.0, 1.0))
     chunk = 4096
 

@@ -86,6 +86,11 @@ class Domain(Protocol):
         ...
 
     @property
+    def objective_name(self) -> str:
+        """What the objective is, with its unit."""
+        ...
+
+    @property
     def bounds(self) -> tuple[tuple[float, float], ...]:
         """Default bounds of a grid over behavior."""
         ...

@@ -40,6 +40,7 @@ class FetchPickAndPlace:
     name = "fetch"
     behavior_names = ("x", "y")
     unit = "m"
+    objective_name = "minus the distance from block to target (m)"
     bounds = ((1.05, 1.55), (0.40, 1.10))
     chunk = 1
     steps = 50

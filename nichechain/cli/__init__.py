@@ -1,0 +1,92 @@
+"""The command line: one module per command, imported only when it is asked for."""
+
+from __future__ import annotations
+
+import importlib
+import os
+import sys
+from collections.abc import Sequence
+
+COMMANDS = {
+    "build": "fill an archive: MAP-Elites that records who was born where",
+    "info": "what is in an archive, and what made it",
+    "evolvability": "l-evolvability of niches, or of an elite",
+    "plot": "heat maps of an archive and graphs of which niches lead to which",
+}
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run a command.
+
+    Parameters
+    ----------
+    arguments : sequence of str, optional
+        By default those of the process.
+
+    Returns
+    -------
+    int
+        Exit status: 0, 2 for bad input, 130 if interrupted.
+    """
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    debug = "--debug" in given
+    words = [word for word in given if word != "--debug"]
+    if not words or words[0] in ("-h", "--help", "help"):
+        print(_help())
+        return 0
+    if words[0] == "--version":
+        from nichechain import __version__
+
+        print(f"nichechain {__version__}")
+        return 0
+    if words[0] not in COMMANDS:
+        return _fail(f"there is no command {words[0]!r}: it must be one of {', '.join(COMMANDS)}")
+    from nichechain.errors import NichechainError
+
+    try:
+        module = importlib.import_module(f"nichechain.cli.{words[0]}")
+        status: int = module.run(words[1:])
+        sys.stdout.flush()
+    except NichechainError as error:
+        if debug:
+            raise
+        return _fail(str(error))
+    except KeyboardInterrupt:
+        if debug:
+            raise
+        return 130
+    except BrokenPipeError:
+        # Whoever read our output has had enough; Python must not try to flush the rest.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+    except OSError as error:
+        if debug:
+            raise
+        return _fail(f"{error.strerror or error}: {error.filename}" if error.filename else str(error))
+    return status
+
+
+def _fail(message: str) -> int:
+    print(f"nichechain: error: {message}", file=sys.stderr)
+    return 2
+
+
+def _help() -> str:
+    width = max(map(len, COMMANDS))
+    lines = [
+        "usage: nichechain COMMAND ... [--debug]",
+        "",
+        "Evolvability in quality-diversity search: which niches will the descendants reach?",
+        "",
+        "commands:",
+        *(f"  {name:<{width}}  {text}" for name, text in COMMANDS.items()),
+        "",
+        "nichechain COMMAND --help tells a command's options; --version tells the version;",
+        "--debug shows where an error comes from.",
+        "",
+        "try:",
+        "  nichechain build fetch",
+        "  nichechain evolvability fetch-pick-and-place --top 10",
+        "  nichechain plot fetch-pick-and-place reachability --out reachability.png",
+    ]
+    return "\n".join(lines)

@@ -1,0 +1,177 @@
+"""What the commands share: reading options, tables, and a progress bar that suits logs too."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any, TypeVar
+
+if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.table import Table
+
+    from nichechain.building import Progress
+
+Command = TypeVar("Command")
+
+# Seconds between progress lines where there is no terminal to redraw.
+_LINE_EVERY = 10.0
+
+
+def parse(
+    command: Callable[..., Command], arguments: Sequence[str], default: Command | None = None
+) -> Command:
+    """Read a command's options; exits with status 2 and a message if they are not well-formed.
+
+    Parameters
+    ----------
+    command : dataclass
+    arguments : sequence of str
+    default : instance, optional
+        Values of the options that are not given.
+    """
+    import tyro
+
+    name = command.__name__.lower()
+    given = {} if default is None else {"default": default}
+    read: Command = tyro.cli(command, prog=f"nichechain {name}", args=list(arguments), **given)  # type: ignore[call-overload]
+    return read
+
+
+def option(metavar: str, default: str) -> Any:
+    """How the help shows an option whose default is worked out later."""
+    import tyro
+
+    return tyro.conf.arg(metavar=metavar, help_behavior_hint=f"(default: {default})")
+
+
+def console() -> Console:
+    """Standard output, with colours only where it is a terminal that wants them."""
+    from rich.console import Console
+
+    return Console(highlight=False, soft_wrap=not sys.stdout.isatty())
+
+
+def table(*columns: str, title: str | None = None) -> Table:
+    """An empty table; columns after the first are right-aligned."""
+    from rich import box
+    from rich.table import Table
+
+    made = Table(title=title, title_justify="left", title_style="bold", box=box.SIMPLE_HEAD)
+    for number, column in enumerate(columns):
+        made.add_column(column, justify="right" if number else "left")
+    return made
+
+
+def facts(rows: dict[str, str]) -> Table:
+    """Names and values, one pair a line."""
+    from rich.table import Table
+
+    made = Table.grid(padding=(0, 2))
+    made.add_column(style="dim")
+    made.add_column(overflow="fold")
+    for name, value in rows.items():
+        made.add_row(name, value)
+    return made
+
+
+def spinner(text: str) -> Any:
+    """Something that turns while a thing is loaded; nothing where there is no terminal."""
+    from rich.console import Console
+
+    return Console(stderr=True).status(text)
+
+
+@contextmanager
+def build_progress(total: int) -> Iterator[Callable[[Progress], None]]:
+    """A progress bar on standard error; plain lines now and then where that is no terminal."""
+    from rich.console import Console
+
+    shown = Console(stderr=True)
+    if shown.is_terminal:
+        with _bar(shown, total) as tell:
+            yield tell
+    else:
+        yield _lines(total)
+
+
+@contextmanager
+def _bar(shown: Console, total: int) -> Iterator[Callable[[Progress], None]]:
+    from rich import progress
+
+    columns = (
+        progress.BarColumn(bar_width=None),
+        progress.MofNCompleteColumn(),
+        progress.TextColumn("{task.fields[rate]}/s"),
+        progress.TextColumn("{task.fields[filled]} niches"),
+        progress.TextColumn("{task.fields[outside]} outside"),
+        progress.TextColumn("{task.fields[failed]}"),
+        progress.TimeRemainingColumn(compact=True),
+        progress.TextColumn("left"),
+    )
+    with progress.Progress(*columns, console=shown) as bar:
+        task = bar.add_task("", total=total, rate="-", filled=0, outside=0, failed="")
+        clock = _Clock()
+
+        def tell(now: Progress) -> None:
+            clock.begin(now.births)
+            bar.update(
+                task,
+                completed=now.births,
+                rate=clock.rate(now.births),
+                filled=now.filled,
+                outside=now.outside,
+                failed=f"{now.failed} failed" if now.failed else "",
+            )
+
+        yield tell
+
+
+def _lines(total: int) -> Callable[[Progress], None]:
+    clock = _Clock()
+    last = time.monotonic()
+
+    def tell(now: Progress) -> None:
+        nonlocal last
+        clock.begin(now.births)
+        if time.monotonic() - last < _LINE_EVERY:
+            return
+        last = time.monotonic()
+        left = clock.seconds_left(now.births, total)
+        print(
+            f"{now.births} of {total} births, {clock.rate(now.births)}/s, {now.filled} niches filled, "
+            f"{now.outside} outside, {now.failed} failed, {left:.0f} s left",
+            file=sys.stderr,
+            flush=True,
+        )
+
+    return tell
+
+
+class _Clock:
+    """Births a second since it began."""
+
+    def __init__(self) -> None:
+        self._began: tuple[float, int] | None = None
+
+    def begin(self, births: int) -> None:
+        """Start the clock; later calls change nothing."""
+        if self._began is None:
+            self._began = time.monotonic(), births
+
+    def _speed(self, births: int) -> float:
+        assert self._began is not None
+        began, first = self._began
+        return (births - first) / max(1e-9, time.monotonic() - began)
+
+    def rate(self, births: int) -> str:
+        """Births a second, to three digits or so."""
+        speed = self._speed(births)
+        return f"{speed:.1f}" if speed < 100 else f"{speed:.0f}"
+
+    def seconds_left(self, births: int, total: int) -> float:
+        """Time that the rest will take at this speed."""
+        speed = self._speed(births)
+        return (total - births) / speed if speed else float("inf")

@@ -1,0 +1,205 @@
+"""``nichechain evolvability``: niches by how many niches their descendants will reach."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import tyro
+
+from nichechain.cli import console
+from nichechain.errors import NichechainError
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from nichechain.archive import Archive
+    from nichechain.chain import NicheChain
+
+
+@dataclass(frozen=True)
+class Evolvability:
+    """l-evolvability of niches, or of the genotype of an elite."""
+
+    path: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="PATH")]
+    """Archive folder, or the name of an archive that ships with nichechain."""
+    l: int = 5  # noqa: E741  # the paper's name
+    """Generations to look ahead."""
+    lineages: int = 100
+    """Independent lineages U: l times U descendants."""
+    niche: Annotated[str | None, console.option("I,J", "none")] = None
+    """One niche, by grid index or number."""
+    elite: Annotated[str | None, console.option("I,J", "none")] = None
+    """The genotype of a niche's elite: its own offspring are evaluated and begin the lineages."""
+    top: Annotated[int | None, console.option("INT", "10")] = None
+    """So many of the best niches."""
+    method: Literal["exact", "monte-carlo"] = "exact"
+    """In closed form, or by the paper's simulation."""
+    convention: Literal["definition", "procedure"] = "definition"
+    """Whether the descendants alone count, or the root's own niche as well."""
+    estimator: Literal["dirichlet", "mle"] = "dirichlet"
+    """How T is estimated from births: a posterior for every row, or row-normalised counts."""
+    unvisited: Annotated[
+        Literal["self", "uniform", "base", "absorb"] | None,
+        console.option("{self,uniform,base,absorb}", "self"),
+    ] = None
+    """For mle: a row without births stays, goes anywhere, goes where most children go, or leaves for good."""
+    offspring: int = 30
+    """Offspring of an elite to evaluate."""
+    min_births: int = 20
+    """Niches with fewer births behind their row of T are not ranked."""
+    draws: int = 50
+    """Posterior draws of T to average over."""
+    repeats: int = 100
+    """Simulations, for --method monte-carlo."""
+    seed: int = 0
+    """Seed of draws, simulations and offspring."""
+    workers: Annotated[int | None, console.option("INT", "one per processor")] = None
+    """Threads for an elite's offspring."""
+    format: Literal["table", "csv", "json"] = "table"
+    """How to write it."""
+
+
+def run(arguments: Sequence[str]) -> int:
+    """Score niches or an elite."""
+    command = console.parse(Evolvability, arguments)
+    _check(command)
+    from nichechain.archive import load
+    from nichechain.coverage import check_lengths
+
+    check_lengths(command.l, command.lineages)
+    archive = load(command.path)
+    chain = archive.chain(command.estimator, unvisited=command.unvisited)
+    if command.niche is not None or command.elite is not None:
+        frame = _one(command, archive, chain)
+    else:
+        frame = _best(command, chain)
+    _write(frame, command)
+    return 0
+
+
+def _check(command: Evolvability) -> None:
+    chosen = {"--niche": command.niche, "--elite": command.elite, "--top": command.top}
+    given = [name for name, value in chosen.items() if value is not None]
+    if len(given) > 1:
+        raise NichechainError(f"{' and '.join(given)} exclude each other: ask for one of them")
+    for name in ("top", "offspring", "draws", "repeats"):
+        value = getattr(command, name)
+        if value is not None and value < 1:
+            raise NichechainError(f"--{name} is {value}, but must be at least 1")
+    for name in ("seed", "min_births"):
+        if getattr(command, name) < 0:
+            option = name.replace("_", "-")
+            raise NichechainError(f"--{option} is {getattr(command, name)}, but must not be negative")
+
+
+def _one(command: Evolvability, archive: Archive, chain: NicheChain) -> pd.DataFrame:
+    """One row, for a niche or the genotype of its elite."""
+    import pandas as pd
+
+    from nichechain.evolvability import genotype_evolvability, l_evolvability
+    from nichechain.execution import Threads
+    from nichechain.niches import parse_niche
+
+    if command.niche is not None:
+        niche = parse_niche(command.niche, "--niche")
+        state = archive.niches.flat(niche)
+        result = l_evolvability(
+            chain,
+            niche=niche,
+            l=command.l,
+            lineages=command.lineages,
+            method=command.method,
+            convention=command.convention,
+            repeats=command.repeats,
+            draws=command.draws,
+            seed=command.seed,
+        )
+    else:
+        assert command.elite is not None
+        elite = archive.elite(parse_niche(command.elite, "--elite"))
+        state = elite.state
+        with Threads(command.workers) as threads, console.spinner("evaluating the elite's offspring"):
+            result = genotype_evolvability(
+                archive,
+                elite,
+                l=command.l,
+                lineages=command.lineages,
+                offspring=command.offspring,
+                chain=chain,
+                method=command.method,
+                convention=command.convention,
+                repeats=command.repeats,
+                draws=command.draws,
+                seed=command.seed,
+                executor=threads,
+            )
+    values = {name: value for name, value in asdict(result).items() if value is not None}
+    root = {"niche": state, "index": archive.niches.label(state)}
+    return pd.DataFrame([{**root, "root": "niche" if command.niche is not None else "elite", **values}])
+
+
+def _best(command: Evolvability, chain: NicheChain) -> pd.DataFrame:
+    """The best niches, best first."""
+    from nichechain.evolvability import niche_evolvability
+
+    scores = niche_evolvability(
+        chain,
+        l=command.l,
+        lineages=command.lineages,
+        method=command.method,
+        convention=command.convention,
+        repeats=command.repeats,
+        draws=command.draws,
+        seed=command.seed,
+    )
+    ranking = scores.ranking(chain, min_births=command.min_births)
+    if ranking.empty:
+        raise NichechainError(
+            f"no niche has {command.min_births} births behind its row of T: "
+            "lower --min-births or build further"
+        )
+    frame = ranking.head(command.top or 10).copy()
+    frame.insert(2, "root", "niche")
+    for name in ("l", "lineages", "method", "convention", "estimator", "saturated"):
+        frame[name] = getattr(scores, name)
+    return frame
+
+
+def _write(frame: pd.DataFrame, command: Evolvability) -> None:
+    if command.format == "csv":
+        print(frame.to_csv(index=False), end="")
+        return
+    if command.format == "json":
+        print(json.dumps(json.loads(frame.to_json(orient="records")), indent=2))
+        return
+    first = frame.iloc[0]
+    shown = console.console()
+    shown.print(
+        f"[bold]{command.l}-evolvability[/]: niches that {command.lineages} lineages of {command.l} "
+        "generations reach"
+    )
+    shown.print(
+        f"[dim]estimator: {first.estimator}; convention: {first.convention}; method: {first.method}[/]"
+    )
+    if "offspring" in frame:
+        shown.print(f"[dim]lineages begin at the niches of {first.offspring} offspring evaluated now[/]")
+    given = bool((frame["low"] == frame["high"]).all())
+    columns = [first.root, "niches reached", *([] if given else ["90 % interval"]), "± s.e."]
+    table = console.table(*columns, "births behind the row")
+    for row in frame.itertuples():
+        interval = [] if given else [f"{row.low:.2f} to {row.high:.2f}"]
+        table.add_row(row.index, f"{row.value:.2f}", *interval, f"{row.standard_error:.2f}", str(row.births))
+    shown.print(table)
+    few = frame[frame["births"] < command.min_births]
+    if len(few):
+        shown.print(
+            f"Fewer than {command.min_births} births behind the row: "
+            "this is mostly what niches in general do."
+        )
+    if first.saturated:
+        shown.print(
+            "Nearly all niches that can be reached are: fewer --lineages would tell roots apart better."
+        )

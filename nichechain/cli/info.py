@@ -1,0 +1,84 @@
+"""``nichechain info``: what is in an archive."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Annotated, Any, Literal
+
+import tyro
+
+from nichechain.cli import console
+
+
+@dataclass(frozen=True)
+class Info:
+    """What is in an archive, with the configuration and versions that made it."""
+
+    path: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="PATH")]
+    """Archive folder, or the name of an archive that ships with nichechain."""
+    format: Literal["table", "json"] = "table"
+    """How to write it."""
+
+
+def run(arguments: Sequence[str]) -> int:
+    """Say what is in the archive."""
+    command = console.parse(Info, arguments)
+    from nichechain.archive import load
+
+    archive = load(command.path)
+    meta, counts, config = archive.meta, archive.counts, archive.config
+    size = sum(path.stat().st_size for path in archive.folder.rglob("*") if path.is_file())
+    names, unit = meta.facts.behavior_names, meta.facts.unit
+    content: dict[str, Any] = {
+        "folder": str(archive.folder),
+        "births": meta.births,
+        "evaluations_asked_for": config.evaluations,
+        "niches": len(archive.niches),
+        "niches_filled": archive.filled,
+        "niches_never_filled": counts.never_filled,
+        "niches_filled_never_parent": counts.never_parent,
+        "rows_of_T_observed": counts.rows_observed,
+        "births_outside": counts.births_outside,
+        "births_failed": meta.births - int(counts.visits.sum()),
+        "deepest_elite": int(archive.elites.depth.max()) if len(archive.elites) else 0,
+        "genotype_length": int(archive.elites.genotype.shape[1]),
+        "bytes": size,
+    }
+    if command.format == "json":
+        made_by = {"configuration": config.to_json(), "versions": meta.versions}
+        print(json.dumps({**content, **made_by}, indent=2))
+        return 0
+    grid = " by ".join(map(str, config.shape))
+    spans = ", ".join(
+        f"{name} {low:g} to {high:g} {unit}" for name, (low, high) in zip(names, config.bounds, strict=True)
+    )
+    state = "complete" if meta.complete else f"unfinished, {config.evaluations} asked for"
+    rows = {
+        "archive": str(archive.folder),
+        "births": f"{meta.births} ({state})",
+        "  outside the grid": str(content["births_outside"]),
+        "  failed": str(content["births_failed"]),
+        "grid": f"{grid} over {spans}",
+        "niches filled": f"{archive.filled} of {len(archive.niches)}",
+        "  never filled": str(content["niches_never_filled"]),
+        "  filled, never a parent": str(content["niches_filled_never_parent"]),
+        "rows of T observed": str(content["rows_of_T_observed"]),
+        "deepest elite": f"{content['deepest_elite']} generations",
+        "genotype": f"{content['genotype_length']} parameters",
+        "on disk": f"{size / 1e6:.1f} MB",
+    }
+    shown = console.console()
+    shown.print(console.facts(rows))
+    shown.print("\n[bold]Configuration[/]")
+    shown.print(console.facts({name: _plain(value) for name, value in config.to_json().items()}))
+    shown.print("\n[bold]Versions[/]")
+    shown.print(console.facts(meta.versions))
+    return 0
+
+
+def _plain(value: Any) -> str:
+    if isinstance(value, tuple):
+        return ", ".join(_plain(part) for part in value)
+    return f"{value:g}" if isinstance(value, float) else str(value)

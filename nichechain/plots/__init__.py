@@ -1,0 +1,7 @@
+"""Figures. Every function draws on a matplotlib Axes and returns it."""
+
+from nichechain.plots.maps import plot_elites, plot_evolvability, plot_visits
+from nichechain.plots.matrix import plot_transitions
+from nichechain.plots.reachability import plot_reachability
+
+__all__ = ["plot_elites", "plot_evolvability", "plot_reachability", "plot_transitions", "plot_visits"]

@@ -1,0 +1,96 @@
+"""The transition matrix as a picture."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy import sparse
+
+from nichechain.errors import NichechainError
+from nichechain.plots.style import EMPTY, INK, colorbar
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from nichechain.archive import Archive
+    from nichechain.chain import NicheChain
+
+# Probabilities below this are left white.
+_SMALLEST = 1e-3
+
+
+def plot_transitions(archive: Archive, chain: NicheChain, ax: Axes) -> Axes:
+    """T between the states that births speak of, in the order of the grid, outside last.
+
+    Parameters
+    ----------
+    archive : Archive
+    chain : NicheChain
+    ax : matplotlib.axes.Axes
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+
+    Raises
+    ------
+    NichechainError
+        If no birth has a parent.
+    """
+    from matplotlib.colors import LogNorm
+
+    counts = archive.counts
+    rows = np.flatnonzero(counts.births)
+    columns = np.flatnonzero(counts.visits)
+    if not rows.size:
+        raise NichechainError(f"{archive.folder} has no births with a parent: there is no T to draw")
+    shown = sparse.csr_array(chain.T)[rows][:, columns].toarray()
+    picture = ax.imshow(
+        np.ma.masked_less(shown, _SMALLEST),
+        norm=LogNorm(_SMALLEST, 1.0),
+        cmap="viridis_r",
+        interpolation="nearest",
+        aspect="auto",
+    )
+    ax.set_facecolor("white")
+    ax.xaxis.set_ticks(*_ticks(archive, columns), rotation=90, fontsize="x-small")
+    ax.yaxis.set_ticks(*_ticks(archive, rows), fontsize="x-small")
+    name, unit = archive.meta.facts.behavior_names[0], archive.meta.facts.unit
+    order = f"by {name} of its centre ({unit})"
+    ax.set(xlabel=f"niche of the child, {order}", ylabel=f"niche of the parent, {order}")
+    # Niches of one column of the grid stand together: their borders show how far children jump.
+    for axis, states in ((ax.axhline, rows), (ax.axvline, columns)):
+        for border in np.flatnonzero(np.diff(_first_index(archive, states))):
+            axis(border + 0.5, color=EMPTY, linewidth=0.6, zorder=0.5)
+    colorbar(ax, picture, f"probability (white: under {_SMALLEST:g})")
+    ax.set_title(f"T: {rows.size} rows with births, {columns.size} states visited ({chain.estimator})")
+    ax.tick_params(length=2, color=INK)
+    return ax
+
+
+def _first_index(archive: Archive, states: np.ndarray) -> np.ndarray:
+    """Position of each state along axis 0 of the grid; outside comes after."""
+    niches = archive.niches
+    return np.array([niches.shape[0] if s == len(niches) else niches.index(int(s))[0] for s in states])
+
+
+def _ticks(archive: Archive, states: np.ndarray) -> tuple[list[float], list[str]]:
+    """A tick in the middle of the niches of each column of the grid, or of some of them."""
+    first = _first_index(archive, states)
+    (low, high), cells = archive.niches.bounds[0], archive.niches.shape[0]
+    middles = {k: float(np.flatnonzero(first == k).mean()) for k in np.unique(first)}
+    centers = {k: f"{low + (k + 0.5) * (high - low) / cells:.3g}" for k in range(cells)}
+    labels = {k: centers.get(int(k), "outside") for k in middles}
+    kept: list[float] = []
+    names: list[str] = []
+    for k, middle in middles.items():
+        # Narrow columns would write over each other; outside is always named.
+        if kept and middle - kept[-1] <= len(states) / 40:
+            if labels[k] != "outside":
+                continue
+            kept.pop()
+            names.pop()
+        kept.append(middle)
+        names.append(labels[k])
+    return kept, names

@@ -1,0 +1,134 @@
+"""Which niches lead to which, as a graph over behavior space."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from nichechain.plots.style import EDGE, EMPTY, FAINT, INK, LONG_JUMP, behavior_axes, colorbar, key
+
+if TYPE_CHECKING:
+    import networkx as nx
+    from matplotlib.axes import Axes
+
+    from nichechain.archive import Archive
+    from nichechain.chain import NicheChain
+
+_WIDEST = 3.0
+_LARGEST = 130.0
+_SMALLEST = 6.0
+
+
+def plot_reachability(archive: Archive, chain: NicheChain, ax: Axes, *, threshold: float = 0.05) -> Axes:
+    """Niches at their centres, and an arrow for every transition of a birth that is probable enough.
+
+    The size of a niche shows its births and its fill how many children stay; width and opacity
+    of an arrow show its probability; jumps over a quarter of the grid's diagonal, the paper's
+    "wormholes", have a colour of their own. Arrows back to the niche of the start are faint, and
+    arrows to the outside state are not drawn.
+
+    Parameters
+    ----------
+    archive : Archive
+    chain : NicheChain
+    ax : matplotlib.axes.Axes
+    threshold : float
+        Smallest probability of an arrow, in [0, 1].
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+    """
+    from matplotlib.lines import Line2D
+
+    behavior_axes(ax, archive)
+    graph = chain.graph(threshold)
+    graph.remove_nodes_from([node for node, at in graph.nodes(data="position") if at is None])
+    _cells(ax, archive)
+    facts = archive.meta.facts
+    back = None if facts.start is None else int(archive.niches.of([facts.start])[0])
+    drawn = [edge for edge in graph.edges if graph.edges[edge]["count"]]
+    # Doing nothing is what most broken children do; arrows back to it would hide all others.
+    falls = [edge for edge in drawn if edge[1] == back]
+    near = [edge for edge in drawn if edge[1] != back and not graph.edges[edge]["long_jump"]]
+    far = [edge for edge in drawn if edge[1] != back and graph.edges[edge]["long_jump"]]
+    _arrows(ax, graph, falls, FAINT, 1)
+    _arrows(ax, graph, near, EDGE, 2)
+    _arrows(ax, graph, far, LONG_JUMP, 3)
+    _nodes(ax, graph)
+    leaving = archive.counts.births_outside / max(1, archive.counts.visits.sum())
+    key(
+        ax,
+        Line2D([], [], color=EDGE, label=f"transition, probability ≥ {threshold:g}"),
+        Line2D([], [], color=LONG_JUMP, label="long jump"),
+        *([Line2D([], [], color=FAINT, label="back to the start")] if falls else []),
+        note=f"{chain.estimator}; size: births; outside ({leaving:.0%} of births) not drawn",
+    )
+    ax.set_title(
+        f"Reachability: {graph.number_of_nodes()} niches, {len(near)} transitions, {len(far)} long jumps"
+    )
+    return ax
+
+
+def _cells(ax: Axes, archive: Archive) -> None:
+    """Faint borders of the niches."""
+    (left, right), (bottom, top) = archive.niches.bounds
+    columns, rows = archive.niches.shape
+    ax.vlines(np.linspace(left, right, columns + 1), bottom, top, color=EMPTY, linewidth=0.5, zorder=0)
+    ax.hlines(np.linspace(bottom, top, rows + 1), left, right, color=EMPTY, linewidth=0.5, zorder=0)
+
+
+def _nodes(ax: Axes, graph: nx.DiGraph) -> None:
+    from matplotlib.colors import PowerNorm
+
+    nodes = sorted(graph.nodes, key=lambda node: graph.nodes[node]["visits"], reverse=True)
+    if not nodes:
+        return
+    at = np.array([graph.nodes[node]["position"] for node in nodes])
+    visits = np.array([graph.nodes[node]["visits"] for node in nodes], float)
+    known = np.array([graph.nodes[node]["births"] > 0 for node in nodes])
+    stay = np.array([graph.nodes[node]["stay"] for node in nodes])
+    # Births differ by orders of magnitude, and so would areas.
+    sizes = _SMALLEST + (_LARGEST - _SMALLEST) * np.log1p(visits) / max(1.0, np.log1p(visits.max()))
+    # A niche that was never a parent has no children that could stay.
+    x, y = at.T
+    ax.scatter(
+        x[~known], y[~known], s=sizes[~known], facecolor="white", edgecolor=INK, linewidth=0.6, zorder=5
+    )
+    dots = ax.scatter(
+        x[known],
+        y[known],
+        s=sizes[known],
+        c=stay[known],
+        cmap="YlGn",
+        norm=PowerNorm(0.5, 0.0, 1.0),
+        edgecolor=INK,
+        linewidth=0.6,
+        zorder=5,
+    )
+    colorbar(ax, dots, "probability that a child stays in the niche")
+
+
+def _arrows(ax: Axes, graph: nx.DiGraph, edges: list[tuple[int, int]], color: str, layer: int) -> None:
+    from matplotlib.patches import FancyArrowPatch
+
+    for i, j in sorted(edges, key=lambda edge: graph.edges[edge]["probability"]):
+        probability = graph.edges[i, j]["probability"]
+        strength = float(np.sqrt(probability))
+        ax.add_patch(
+            FancyArrowPatch(
+                graph.nodes[i]["position"],
+                graph.nodes[j]["position"],
+                # Curved, so that an arrow and its opposite do not lie on each other.
+                connectionstyle="arc3,rad=0.12",
+                arrowstyle="-|>",
+                mutation_scale=4 + 5 * strength,
+                linewidth=0.3 + _WIDEST * strength,
+                alpha=0.12 + 0.75 * strength,
+                color=color,
+                shrinkA=3,
+                shrinkB=3,
+                zorder=layer,
+            )
+        )

@@ -1,0 +1,105 @@
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+import nichechain as nc
+from nichechain import plots
+from nichechain.errors import NichechainError
+from nichechain.plots.style import FAINT, LONG_JUMP, behavior_axes
+
+
+@pytest.fixture(scope="module")
+def archive(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("plots") / "arm"
+    config = nc.BuildConfig("arm", (6, 9), ((-1, 1), (-1, 1)), evaluations=800, scale=0.5)
+    with nc.Threads(1) as threads:
+        nc.build(config, folder, threads)
+    return nc.load(folder)
+
+
+@pytest.fixture
+def ax():
+    return Figure().add_subplot()
+
+
+def drawn(ax):
+    """Values of the map, as (x, y)."""
+    return ax.collections[0].get_array().T
+
+
+def test_visits_shows_births_where_they_are(archive, ax):
+    assert plots.plot_visits(archive, ax) is ax
+    values = drawn(ax)
+    assert values.shape == (6, 9)
+    births = archive.births()
+    for index in ((0, 4), (5, 4), (3, 8)):
+        expected = int((births["child_niche"] == 9 * index[0] + index[1]).sum())
+        assert np.ma.filled(values[index], 0) == expected
+
+
+def test_axes_are_behavior_in_its_unit(archive, ax):
+    plots.plot_elites(archive, ax)
+    assert ax.get_xlabel() == "x (arm lengths)"
+    assert ax.get_xlim() == (-1, 1)
+    assert ax.get_aspect() == 1
+    (start,) = [line for line in ax.lines if line.get_label() == "start"]
+    assert start.get_xydata().tolist() == [[1.0, 0.0]]
+
+
+def test_elites_shows_objectives_and_behaviors(archive, ax):
+    plots.plot_elites(archive, ax)
+    values = drawn(ax)
+    elite = archive.elite(int(archive.elites.niche[3]))
+    assert values[elite.niche] == elite.objective
+    assert np.ma.count(values) == archive.filled
+
+
+def test_evolvability_leaves_out_niches_without_births(archive, ax):
+    scores = nc.niche_evolvability(archive.chain(), l=2, lineages=5, draws=4)
+    plots.plot_evolvability(archive, scores, ax, min_births=10)
+    births = archive.counts.births[:54].reshape(6, 9)
+    values = drawn(ax)
+    assert (np.ma.getmaskarray(values) == (births == 0)).all()
+    hatched = ax.collections[1].get_array().T
+    assert (~np.ma.getmaskarray(hatched) == ((births > 0) & (births < 10))).all()
+
+
+def test_transitions_shows_rows_with_births(archive, ax):
+    chain = archive.chain("mle")
+    plots.plot_transitions(archive, chain, ax)
+    picture = ax.images[0].get_array()
+    rows, columns = np.flatnonzero(archive.counts.births), np.flatnonzero(archive.counts.visits)
+    assert picture.shape == (rows.size, columns.size)
+    dense = chain.T.toarray()
+    assert picture[4, 7] == dense[rows[4], columns[7]] or dense[rows[4], columns[7]] < 1e-3
+
+
+def test_reachability_has_an_arrow_per_observed_transition(archive, ax):
+    chain = archive.chain()
+    plots.plot_reachability(archive, chain, ax, threshold=0.05)
+    dense = np.asarray(chain.T)
+    counts = archive.counts.matrix.toarray()
+    n = len(archive.niches)
+    wanted = (dense >= 0.05) & (counts > 0)
+    np.fill_diagonal(wanted, False)
+    assert len(ax.patches) == wanted[:n, :n].sum()
+    graph = chain.graph(0.05)
+    far = [edge for edge in graph.edges if graph.edges[edge]["long_jump"] and graph.edges[edge]["count"]]
+    start = archive.niches.of([[1.0, 0.0]])[0]
+    colors = [matplotlib_color(patch) for patch in ax.patches]
+    assert colors.count(LONG_JUMP) == sum(child != start for _, child in far) > 0
+    assert colors.count(FAINT) == wanted[:n, start].sum()
+
+
+def matplotlib_color(patch):
+    from matplotlib.colors import to_hex
+
+    return to_hex(patch.get_facecolor())
+
+
+def test_maps_need_two_axes_of_behavior(ax):
+    class Flat:
+        meta = type("Meta", (), {"facts": type("Facts", (), {"behavior_names": ("x",)})()})()
+
+    with pytest.raises(NichechainError, match="1 axes"):
+        behavior_axes(ax, Flat())
