@@ -135,15 +135,17 @@ class Archive:
     def counts(self) -> TransitionCounts:
         """Births from niche to niche."""
         table = store.read_births(self.folder, self.meta)
-        parent, child = (table[name].fill_null(NONE).to_numpy() for name in ("parent_niche", "child_niche"))
-        return TransitionCounts.from_births(parent, child, self.niches)
+        parent, child, elite = (
+            table[name].fill_null(NONE).to_numpy() for name in ("parent_niche", "child_niche", "parent_uid")
+        )
+        return TransitionCounts.from_births(parent, child, self.niches, elite=elite)
 
-    def chain(self, estimator: str = "dirichlet", **options: Any) -> NicheChain:
+    def chain(self, estimator: str = "empirical-bayes", **options: Any) -> NicheChain:
         """The Markov chain over niches, estimated from all births.
 
         Parameters
         ----------
-        estimator : {"dirichlet", "mle"}
+        estimator : {"empirical-bayes", "dirichlet", "mle"}
         **options
             Of :func:`nichechain.chain.estimate`, such as ``unvisited="self"``.
         """

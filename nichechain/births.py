@@ -87,6 +87,7 @@ def table(
     child_niche: NDArray[np.int64],
     accepted: NDArray[np.bool_],
     step: int,
+    run: int | NDArray[np.int64] = 0,
 ) -> pa.Table:
     """Births of one step as rows.
 
@@ -98,12 +99,13 @@ def table(
         ``NONE`` where the evaluation failed.
     accepted : (N,) bool array
     step : int
+    run : int or (N,) int64 array
     """
     n = len(offspring)
     axes = evaluation.behavior.shape[1]
     failed = evaluation.failed
     columns = [
-        np.zeros(n, np.int32),
+        np.broadcast_to(np.asarray(run, np.int32), n),
         offspring.uid,
         pa.array(offspring.parent_uid, mask=offspring.parent_uid == NONE),
         offspring.depth,

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import operator
 from dataclasses import asdict, dataclass, fields
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 from nichechain.errors import NichechainError
 
@@ -64,12 +65,27 @@ class BuildConfig:
     seed: int = 0
 
     def __post_init__(self) -> None:
+        for name in ("evaluations", "initial", "batch", "seed", "domain_seed"):
+            try:
+                # Numbers of NumPy become plain ones, which JSON can hold.
+                object.__setattr__(self, name, operator.index(getattr(self, name)))
+            except TypeError:
+                raise NichechainError(
+                    f"{name} is {getattr(self, name)!r}, but must be a whole number"
+                ) from None
+        object.__setattr__(self, "shape", tuple(int(cells) for cells in self.shape))
+        object.__setattr__(self, "bounds", tuple((float(low), float(high)) for low, high in self.bounds))
+        object.__setattr__(self, "scale", float(self.scale))
         for name in ("evaluations", "initial", "batch"):
             if getattr(self, name) < 1:
                 raise NichechainError(f"{name} is {getattr(self, name)}, but must be at least 1")
         for name in ("seed", "domain_seed"):
             if getattr(self, name) < 0:
                 raise NichechainError(f"{name} is {getattr(self, name)}, but must not be negative")
+        if self.replacement not in get_args(Replacement):
+            raise NichechainError(
+                f"replacement is {self.replacement!r}, but must be one of {', '.join(get_args(Replacement))}"
+            )
 
     def to_json(self) -> dict[str, Any]:
         """Plain values for JSON."""
@@ -88,7 +104,4 @@ class BuildConfig:
         if set(values) != names:
             odd = ", ".join(sorted(set(values) ^ names))
             raise NichechainError(f"the configuration has missing or unknown values: {odd}")
-        plain = dict(values)
-        plain["shape"] = tuple(plain["shape"])
-        plain["bounds"] = tuple((low, high) for low, high in plain["bounds"])
-        return cls(**plain)
+        return cls(**values)

@@ -18,6 +18,9 @@ Ints = NDArray[np.int64]
 # Cells of the table (repeats, niches) and walks in flight that a simulation keeps at once.
 _SIMULATION_CELLS = 8_000_000
 
+# Above this share of nonzeros a dense product is faster than a sparse one.
+_DENSE = 0.3
+
 
 class LinearMap(Protocol):
     """A matrix we only multiply with: sparse, dense, or sparse plus low rank."""
@@ -72,7 +75,7 @@ def expected_coverage(
     visits niche j.
     """
     sizes = np.atleast_1d(np.asarray(lineages))
-    check_lengths(generations, int(sizes.min()))
+    check_lengths(generations, sizes.min())
     coverage = np.zeros((first.shape[0], sizes.size))
     for _, visited in visit_probabilities(transition, first, generations, counted, columns):
         for k, size in enumerate(sizes):
@@ -102,6 +105,8 @@ def visit_probabilities(
     """
     states = transition.shape[0]
     niches = states if counted is None else counted
+    if sparse.issparse(transition) and transition.nnz > _DENSE * states**2:  # type: ignore[attr-defined]
+        transition = transition.toarray()  # type: ignore[attr-defined]
     for start in range(0, niches, columns):
         targets = np.arange(start, min(start + columns, niches))
         hit = np.zeros((states, targets.size))
@@ -209,7 +214,10 @@ def rarefied_coverage(counts: ArrayLike, size: int, *, counted: int | None = Non
 
 
 def check_lengths(generations: int, lineages: int) -> None:
-    """Refuse a lineage without generations, or none at all."""
+    """Refuse a lineage without generations, none at all, and parts of one."""
+    for name, number in (("l", generations), ("lineages", lineages)):
+        if not isinstance(number, (int, np.integer)):
+            raise NichechainError(f"{name} is {number}, but must be a whole number")
     if generations < 1:
         raise NichechainError(f"l is {generations}, but a lineage has at least 1 generation")
     if lineages < 1:
@@ -241,6 +249,8 @@ class _RowSampler:
         self._columns = matrix.indices
 
     def draw(self, rows: Ints, rng: np.random.Generator) -> Ints:
-        found = np.searchsorted(self._upper, rows + rng.random(rows.size), side="right")
+        # The sum could round up to the next row's interval.
+        at = np.minimum(rows + rng.random(rows.size), np.nextafter(rows + 1.0, 0.0))
+        found = np.searchsorted(self._upper, at, side="right")
         drawn: Ints = self._columns[found].astype(np.int64)
         return drawn

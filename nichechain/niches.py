@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -136,7 +137,12 @@ class GridNiches:
             if not 0 <= niche < len(self):
                 raise NichechainError(f"niche is {niche}, but the grid has niches 0 to {len(self) - 1}")
             return int(niche)
-        index = tuple(int(k) for k in niche)
+        try:
+            index = tuple(operator.index(k) for k in niche)
+        except TypeError:
+            raise NichechainError(
+                f"niche is {niche!r}, but must be a whole number or one per axis of the grid"
+            ) from None
         if len(index) != len(self.shape):
             raise NichechainError(f"niche is {index}, but a niche of this grid has {len(self.shape)} indices")
         for k, size in zip(index, self.shape, strict=True):

@@ -35,6 +35,14 @@ class Purpose(IntEnum):
     """Seed of one of many runs of a configuration; index: the number of the run."""
     NOVELTY_ARCHIVE = 9
     """Which births enter a novelty archive; index: the step."""
+    PERMUTATION = 10
+    """Relabellings of a permutation test; index: which test."""
+    CHECKED = 11
+    """Which elites the chain's predictions are checked on."""
+    LINEAGE = 12
+    """A birth in a lineage without selection; index: its elite, lineage and generation."""
+    PREDICTION = 13
+    """Lineages simulated on a draw of T; index: the draw."""
 
 
 def keyed(seed: int, purpose: Purpose, index: int = 0) -> np.random.Generator:

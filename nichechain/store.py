@@ -21,6 +21,7 @@ import hashlib
 import io
 import json
 import os
+import zipfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
@@ -132,6 +133,16 @@ def read_meta(folder: Path) -> Meta:
             raise ArchiveError(
                 f"{path} has format {values['format']}, but this version reads format {FORMAT}"
             )
+        if values.pop("sha256") != _checksum(values):
+            raise ArchiveError(f"{path} is damaged: its checksum is not the one that was committed")
+        total = int(values["births"])
+        elites = {name: str(values["elites"][name]) for name in ("file", "sha256")}
+        parts: tuple[dict[str, Any], ...] = tuple(
+            {"file": str(part["file"]), "sha256": str(part["sha256"]), "rows": int(part["rows"])}
+            for part in values["parts"]
+        )
+        if sum(part["rows"] for part in parts) != total:
+            raise ArchiveError(f"{path} is damaged: its parts do not add up to {total} births")
         facts = values["domain"]
         start = facts["start"]
         return Meta(
@@ -143,10 +154,10 @@ def read_meta(folder: Path) -> Meta:
                 None if start is None else tuple(float(x) for x in start),
             ),
             values["versions"],
-            int(values["births"]),
+            total,
             int(values["step"]),
-            values["elites"],
-            tuple(values["parts"]),
+            elites,
+            parts,
         )
     except ArchiveError:
         raise
@@ -167,7 +178,7 @@ def read_state(folder: Path, meta: Meta) -> SearchState:
         with np.load(io.BytesIO(content), allow_pickle=False) as arrays:
             elites = Elites(*(arrays[name] for name in Elites.__dataclass_fields__))
             pending = Offspring(*(arrays[f"pending_{name}"] for name in Offspring.__dataclass_fields__))
-    except (ValueError, KeyError, OSError) as error:
+    except (ValueError, KeyError, TypeError, EOFError, OSError, zipfile.BadZipFile) as error:
         raise ArchiveError(f"{folder / meta.elites['file']} is damaged: {error}") from error
     return SearchState(elites, pending, meta.births, meta.step)
 
@@ -238,6 +249,7 @@ class Writer:
             "elites": elites,
             "parts": parts,
         }
+        meta["sha256"] = _checksum(meta)
         self._write(_META, json.dumps(meta, indent=2).encode())
         self._sweep({_META, elites["file"], *(part["file"] for part in parts)})
 
@@ -289,6 +301,7 @@ def writing(folder: Path) -> Iterator[None]:
 def clear(folder: Path) -> None:
     """Remove an archive's files from a folder, and nothing else."""
     (folder / _META).unlink(missing_ok=True)
+    (folder / f"{_META}.tmp").unlink(missing_ok=True)
     for pattern in ("elites-*.npz*", f"{_BIRTHS}/part-*.parquet*"):
         for path in folder.glob(pattern):
             path.unlink()
@@ -306,6 +319,11 @@ def library_versions() -> dict[str, str]:
         except PackageNotFoundError:
             found[name] = "none"
     return found
+
+
+def _checksum(meta: dict[str, Any]) -> str:
+    """SHA-256 of the metadata as they are written, without their own checksum."""
+    return hashlib.sha256(json.dumps(meta, indent=2).encode()).hexdigest()
 
 
 def _read_part(folder: Path, part: dict[str, Any]) -> pa.Table:
@@ -327,7 +345,9 @@ def _read(folder: Path, entry: dict[str, Any]) -> bytes:
     try:
         content = path.read_bytes()
     except OSError as error:
-        raise ArchiveError(f"{path} cannot be read: {error.strerror}") from error
+        raise ArchiveError(
+            f"{path} cannot be read: {error.strerror}; if a build goes on there, load the archive again"
+        ) from error
     if hashlib.sha256(content).hexdigest() != entry["sha256"]:
         raise ArchiveError(f"{path} is damaged: its checksum is not the one that was committed")
     return content

@@ -105,12 +105,12 @@ class BaseMeasure:
         result = np.where(parent < n, np.where(child < n, 0.0, self.leaving), self.destination[child])
         inside = (parent < n) & (child < n)
         where = _cells_apart(self.niches, parent[inside], child[inside])
-        share = self.displacement[where] / self._within[parent[inside]]
+        share = self.displacement[where] / self.within[parent[inside]]
         result[inside] = (1.0 - self.leaving) * share
         return result
 
     @property
-    def _within(self) -> Floats:
+    def within(self) -> Floats:
         """Share of the kernel that stays in the grid, for a parent in each niche, (n,)."""
         # Correlation of the kernel with the grid's indicator.
         flipped = np.flip(self.displacement)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -29,14 +29,20 @@ class TransitionCounts:
     niches : GridNiches
     visits : (S,) int64 array
         Births in each state, initial ones included.
+    families : (F, 4) int64 array
+        Rows (state, elite, child state, children): whose children they are, as far as births say.
+        Numbers of elites matter only in that they differ.
     """
 
     matrix: sparse.csr_array
     niches: GridNiches
     visits: Ints
+    families: Ints = field(default_factory=lambda: np.empty((0, 4), np.int64))
 
     @classmethod
-    def from_births(cls, parent: ArrayLike, child: ArrayLike, niches: GridNiches) -> TransitionCounts:
+    def from_births(
+        cls, parent: ArrayLike, child: ArrayLike, niches: GridNiches, *, elite: ArrayLike | None = None
+    ) -> TransitionCounts:
         """Counts of births.
 
         Parameters
@@ -46,11 +52,26 @@ class TransitionCounts:
             a visit, and one without a niche failed and is left out.
         niches : GridNiches
             The niches that the numbers belong to.
+        elite : (N,) ints, optional
+            uid of the parent, which tells siblings from cousins.
+
+        Raises
+        ------
+        NichechainError
+            If the lengths differ or a state does not exist.
         """
         i, j = np.asarray(parent, np.int64), np.asarray(child, np.int64)
+        _check_pairs(i, j, niches, lowest=NONE)
         moved = (i != NONE) & (j != NONE)
         counts = cls.from_pairs(i[moved], j[moved], niches)
-        return cls(counts.matrix, niches, np.bincount(j[j != NONE], minlength=niches.states))
+        counts = replace(counts, visits=np.bincount(j[j != NONE], minlength=niches.states))
+        if elite is None:
+            return counts
+        uid = np.asarray(elite, np.int64)
+        if uid.shape != i.shape:
+            raise NichechainError(f"elites have shape {uid.shape} and parents {i.shape}, but must be alike")
+        kinds, size = np.unique(np.stack([i[moved], uid[moved], j[moved]]), axis=1, return_counts=True)
+        return replace(counts, families=np.vstack([kinds, size]).T)
 
     @classmethod
     def from_pairs(cls, parent: ArrayLike, child: ArrayLike, niches: GridNiches) -> TransitionCounts:
@@ -62,12 +83,7 @@ class TransitionCounts:
             If the lengths differ or a state does not exist.
         """
         i, j = np.asarray(parent, np.int64), np.asarray(child, np.int64)
-        if i.shape != j.shape or i.ndim != 1:
-            raise NichechainError(f"parents have shape {i.shape} and children {j.shape}, but must be alike")
-        for states in (i, j):
-            if states.size and (states.min() < 0 or states.max() >= niches.states):
-                odd = states[(states < 0) | (states >= niches.states)][0]
-                raise NichechainError(f"state is {odd}, but states run from 0 to {niches.states - 1}")
+        _check_pairs(i, j, niches, lowest=0)
         shape = (niches.states, niches.states)
         matrix = sparse.coo_array((np.ones(i.size, np.int64), (i, j)), shape=shape).tocsr()
         return cls(matrix, niches, np.bincount(j, minlength=niches.states))
@@ -82,7 +98,16 @@ class TransitionCounts:
         """
         if self.niches != other.niches:
             raise NichechainError(f"niches differ: {self.niches} and {other.niches}")
-        return TransitionCounts((self.matrix + other.matrix).tocsr(), self.niches, self.visits + other.visits)
+        later = other.families.copy()
+        if len(self.families):
+            # Elites of two runs may bear the same number.
+            later[:, 1] += self.families[:, 1].max() + 1 - later[:, 1].min(initial=0)
+        return TransitionCounts(
+            (self.matrix + other.matrix).tocsr(),
+            self.niches,
+            self.visits + other.visits,
+            np.concatenate([self.families, later]),
+        )
 
     @property
     def births(self) -> Ints:
@@ -109,3 +134,14 @@ class TransitionCounts:
     def births_outside(self) -> int:
         """Births out of bounds."""
         return int(self.visits[len(self.niches) :].sum())
+
+
+def _check_pairs(parent: Ints, child: Ints, niches: GridNiches, *, lowest: int) -> None:
+    if parent.shape != child.shape or parent.ndim != 1:
+        raise NichechainError(
+            f"parents have shape {parent.shape} and children {child.shape}, but must be alike"
+        )
+    for states in (parent, child):
+        odd = states[(states < lowest) | (states >= niches.states)]
+        if odd.size:
+            raise NichechainError(f"state is {odd[0]}, but states run from 0 to {niches.states - 1}")

@@ -140,12 +140,12 @@ def _stochastic(transition: ArrayLike | sparse.sparray | sparse.spmatrix) -> Mat
         matrix = as_given.astype(np.float64)
         values = matrix.data
     else:
-        array = np.asarray(transition)
-        given = array.dtype
         try:
+            array = np.asarray(transition)
+            given = array.dtype
             matrix = array.astype(np.float64)
         except (TypeError, ValueError):
-            raise NichechainError(f"T has values of type {given}, but must have numbers") from None
+            raise NichechainError("T has rows of unequal length or values that are no numbers") from None
         values = matrix
     if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1] or not matrix.shape[0]:
         raise NichechainError(f"T has shape {matrix.shape}, but must be square with at least one state")
@@ -159,6 +159,5 @@ def _stochastic(transition: ArrayLike | sparse.sparray | sparse.spmatrix) -> Mat
     worst = int(np.argmax(off))
     if off[worst] > 8 * matrix.shape[0] * precision + 1e-12:
         raise NichechainError(f"row {worst} of T sums to {sums[worst]:.9g}, but every row must sum to 1")
-    if isinstance(matrix, np.ndarray):
-        matrix.setflags(write=False)
+    values.setflags(write=False)
     return matrix

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,11 +17,12 @@ Floats = NDArray[np.float64]
 
 # A draw of the prior's part of a row leaves at most this much of it, in expectation, in one place.
 _REMAINDER = 1e-4
+_FEW_STATES = 16
 
 
 @dataclass(frozen=True)
 class DirichletPosterior:
-    """Row i of T is Dirichlet(C_i + s B_i), rows independent.
+    """Row i of T is Dirichlet(C_i / e_i + s B_i), rows independent.
 
     Parameters
     ----------
@@ -30,11 +32,19 @@ class DirichletPosterior:
         B.
     strength : float
         s, the number of births that the base measure is worth.
+    design_effect : (S,) float64 array
+        e, the number of births of each row that are worth one independent birth.
     """
 
     counts: TransitionCounts
     base: BaseMeasure
     strength: float
+    design_effect: Floats
+
+    @cached_property
+    def weights(self) -> sparse.csr_array:
+        """C_ij / e_i: births of each row as independent ones, (S, S)."""
+        return (sparse.diags_array(1.0 / self.design_effect) @ self.counts.matrix).tocsr()
 
     @property
     def absorbing(self) -> bool:
@@ -43,9 +53,9 @@ class DirichletPosterior:
 
     def mean(self) -> Floats:
         """Posterior mean of T, (S, S): dense, 8 S² bytes."""
-        births = self.counts.births
+        births = self.counts.births / self.design_effect
         rows = self.strength * self.base.rows(np.arange(births.size))
-        rows += self.counts.matrix.toarray()
+        rows += self.weights.toarray()
         rows /= (births + self.strength)[:, None]
         if self.absorbing:
             rows[-1] = 0.0
@@ -57,35 +67,31 @@ class DirichletPosterior:
 
         Notes
         -----
-        Dirichlet(C + s B) is w·Dirichlet(C) + (1 − w)·Dirichlet(s B) with w ~ Beta(|C|, s). The
+        With C for C/e: Dirichlet(C + s B) is w·Dirichlet(C) + (1 − w)·Dirichlet(s B) with w ~
+        Beta(|C|, s). The
         first part lives on the few states that were observed. The second is drawn by breaking a
         stick (Sethuraman 1994): its k-th piece, Beta(1, s) of what is left, goes to a state drawn
         from B. Pieces shrink fast, so a row of n states needs only about 9 s of them, not n.
         """
-        matrix = self.counts.matrix.tocoo()
+        matrix = self.weights.tocoo()
         rows, columns = matrix.coords
-        births = self.counts.births
+        births = self.counts.births / self.design_effect
         states = births.size
         known = np.zeros(states)
         seen = births > 0
         known[seen] = rng.beta(births[seen], self.strength)
-        share = rng.standard_gamma(matrix.data.astype(np.float64))
+        share = rng.standard_gamma(matrix.data)
         share *= (known / np.maximum(np.bincount(rows, share, states), np.finfo(float).tiny))[rows]
         pieces = self._pieces(states)
-        if pieces < states:
-            left = rng.random((states, pieces)) ** (1.0 / self.strength)
-            left[:, -1] = 0.0
-            before = np.cumprod(np.hstack([np.ones((states, 1)), left[:, :-1]]), axis=1)
-            prior = before * (1.0 - left)
-            parents = np.repeat(np.arange(states), pieces)
-            landed = self.base.sample(parents, rng)
-        else:
-            weight = self.strength * self.base.rows(np.arange(states))
-            gamma = np.maximum(rng.standard_gamma(weight), np.finfo(float).tiny)
-            prior = gamma / gamma.sum(axis=1, keepdims=True)
-            parents = np.repeat(np.arange(states), states)
-            landed = np.tile(np.arange(states), states)
-        prior *= (1.0 - known)[:, None]
+        # In a row of few states, gamma variates of tiny shape would all underflow.
+        if pieces >= max(states, _FEW_STATES):
+            return sparse.csr_array(self._draw_whole_rows(known, (rows, columns, share), rng))
+        left = rng.random((states, pieces)) ** (1.0 / self.strength)
+        left[:, -1] = 0.0
+        before = np.cumprod(np.hstack([np.ones((states, 1)), left[:, :-1]]), axis=1)
+        prior = before * (1.0 - left) * (1.0 - known)[:, None]
+        parents = np.repeat(np.arange(states), pieces)
+        landed = self.base.sample(parents, rng)
         data = np.concatenate([share, prior.ravel()])
         index = np.concatenate([rows, parents]), np.concatenate([columns, landed])
         if self.absorbing:
@@ -94,8 +100,21 @@ class DirichletPosterior:
             index = np.append(index[0][stays], states - 1), np.append(index[1][stays], states - 1)
         return sparse.coo_array((data, index), shape=matrix.shape).tocsr()
 
+    def _draw_whole_rows(
+        self, known: Floats, observed: tuple[Floats, Floats, Floats], rng: np.random.Generator
+    ) -> Floats:
+        """The same where a stick would need more pieces than there are states."""
+        rows, columns, share = observed
+        gamma = rng.standard_gamma(self.strength * self.base.rows(np.arange(known.size)))
+        drawn: Floats = gamma * ((1.0 - known) / gamma.sum(axis=1))[:, None]
+        drawn[rows, columns] += share
+        if self.absorbing:
+            drawn[-1] = 0.0
+            drawn[-1, -1] = 1.0
+        return drawn
+
     def _pieces(self, states: int) -> int:
         """Pieces of the stick after which the rest is expected to be below ``_REMAINDER``."""
         if self.strength > states:
-            return states
+            return max(states, _FEW_STATES)
         return 1 + math.ceil(math.log(_REMAINDER) / math.log(self.strength / (1.0 + self.strength)))

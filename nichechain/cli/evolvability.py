@@ -39,8 +39,8 @@ class Evolvability:
     """In closed form, or by the paper's simulation."""
     convention: Literal["definition", "procedure"] = "definition"
     """Whether the descendants alone count, or the root's own niche as well."""
-    estimator: Literal["dirichlet", "mle"] = "dirichlet"
-    """How T is estimated from births: a posterior for every row, or row-normalised counts."""
+    estimator: Literal["empirical-bayes", "dirichlet", "mle"] = "empirical-bayes"
+    """T from births: posteriors around a pooled or a uniform base, or row-normalised counts."""
     unvisited: Annotated[
         Literal["self", "uniform", "base", "absorb"] | None,
         console.option("{self,uniform,base,absorb}", "self"),

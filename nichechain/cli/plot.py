@@ -38,7 +38,7 @@ class Plot:
     """Lineages, for evolvability."""
     threshold: float = 0.05
     """Smallest probability that gets an arrow, for reachability."""
-    estimator: Literal["dirichlet", "mle"] = "dirichlet"
+    estimator: Literal["empirical-bayes", "dirichlet", "mle"] = "empirical-bayes"
     """How T is estimated."""
     min_births: int = 20
     """Niches with fewer births behind their row of T are crossed out, for evolvability."""

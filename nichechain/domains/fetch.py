@@ -118,7 +118,7 @@ class FetchPickAndPlace:
             if not episode.failure:
                 block = episode.observations[-1, 3:6]
                 behavior[i] = block[:2]
-                objective[i] = -np.linalg.norm(block - self._episodes.goal)
+                objective[i] = -np.linalg.norm(block - self._episodes.goal, axis=-1)
         return Evaluation(behavior, objective, np.array([bool(reason) for reason in reasons]), tuple(reasons))
 
     def episode(self, genotype: ArrayLike) -> Episode:

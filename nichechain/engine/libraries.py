@@ -110,6 +110,8 @@ def _ufunc_loop(ufunc: np.ufunc, signature: str) -> tuple[int, int]:
     known = (struct.nin, struct.nout, struct.ntypes, struct.name)
     if known != (ufunc.nin, ufunc.nout, ufunc.ntypes, ufunc.__name__.encode()):
         raise NativeUnavailableError(f"NumPy {np.__version__} lays out its ufuncs differently")
+    if signature not in ufunc.types:
+        raise NativeUnavailableError(f"NumPy {np.__version__} has no {ufunc.__name__} for {signature}")
     index = ufunc.types.index(signature)
     data = struct.data[index] if struct.data else None
     return struct.functions[index] or 0, data or 0

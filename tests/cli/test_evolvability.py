@@ -85,7 +85,7 @@ def test_table_stands_with_what_it_rests_on(built, capsys):
         (["--seed", "-1"], "--seed is -1"),
         (["--min-births", "-1"], "--min-births is -1"),
         (["--min-births", "100000"], "no niche has 100000 births"),
-        (["--unvisited", "base"], "unvisited belongs to the estimator mle"),
+        (["--unvisited", "base"], "unvisited belongs to mle"),
     ],
 )
 def test_bad_options_are_one_sentence(built, capsys, options, said):

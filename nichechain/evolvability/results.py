@@ -1,0 +1,101 @@
+"""What an answer is: a number with what it rests on."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from nichechain.chain.model import NicheChain
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Evolvability:
+    """l-evolvability of one root, with what it rests on.
+
+    Parameters
+    ----------
+    value : float
+        Expected number of niches visited: exact where T is given, the mean over posterior draws
+        of T (and of D) where they are estimated.
+    standard_error : float
+        Of ``value``, from the finite number of draws and simulations.
+    low, high : float
+        5 % and 95 % quantiles over the draws: what births leave open. Equal to ``value`` where T
+        is given.
+    l, lineages : int
+        Generations, and number U of lineages.
+    method, convention, estimator : str
+        How it was computed, what was counted, where T came from.
+    births : int, optional
+        Births behind the root's row of T; None where T is given or the root has no row.
+    saturated : bool
+        Whether the lineages see nearly all that endlessly many would: fewer tell roots apart
+        better.
+    offspring : int, optional
+        Offspring whose niches gave D, for a genotype.
+    """
+
+    value: float
+    standard_error: float
+    low: float
+    high: float
+    l: int  # noqa: E741  # the paper's name
+    lineages: int
+    method: str
+    convention: str
+    estimator: str
+    births: int | None
+    saturated: bool
+    offspring: int | None = None
+
+    def __str__(self) -> str:
+        return (
+            f"{self.value:.2f} niches ({self.low:.2f} to {self.high:.2f}; l = {self.l}, "
+            f"{self.lineages} lineages, {self.convention}, {self.estimator}, {self.method})"
+        )
+
+
+@dataclass(frozen=True)
+class NicheEvolvability:
+    """l-evolvability of every niche, as arrays (n_niches,); the fields of :class:`Evolvability`."""
+
+    value: Floats
+    standard_error: Floats
+    low: Floats
+    high: Floats
+    births: NDArray[np.int64] | None
+    l: int  # noqa: E741
+    lineages: int
+    method: str
+    convention: str
+    estimator: str
+    saturated: bool
+
+    def to_frame(self, chain: NicheChain) -> pd.DataFrame:
+        """One row per niche, with its label."""
+        columns = {
+            "niche": np.arange(self.value.size),
+            "index": [chain.label(niche) for niche in range(self.value.size)],
+            "value": self.value,
+            "low": self.low,
+            "high": self.high,
+            "standard_error": self.standard_error,
+        }
+        if self.births is not None:
+            columns["births"] = self.births
+        return pd.DataFrame(columns)
+
+    def ranking(self, chain: NicheChain, *, min_births: int = 20) -> pd.DataFrame:
+        """Rows of :meth:`to_frame`, the largest value first, without niches of fewer births.
+
+        A niche that births say little about would rank by its prior.
+        """
+        frame = self.to_frame(chain)
+        if self.births is not None:
+            frame = frame[frame["births"] >= min_births]
+        return frame.sort_values("value", ascending=False, kind="stable").reset_index(drop=True)

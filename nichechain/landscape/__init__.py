@@ -1,0 +1,40 @@
+"""Measures of a behavior landscape: sensitivity, evolvability, dissimila."""
+
+from __future__ import annotations
+
+from nichechain.landscape.behaviors import (
+    EPSILON,
+    dissimila_ratio,
+    evolvability,
+    expected_evolvability,
+    expected_global_sensitivity,
+    expected_local_sensitivity,
+    global_sensitivity,
+    hull_volume,
+    local_sensitivity,
+    one_hot_evolvability,
+    population_evolvability,
+)
+from nichechain.landscape.dissimila import QUANTILES, Dissimila, find_dissimila
+from nichechain.landscape.genotypes import LandscapeMeasures, measure, measure_all, niches_of
+
+__all__ = [
+    "EPSILON",
+    "QUANTILES",
+    "Dissimila",
+    "LandscapeMeasures",
+    "dissimila_ratio",
+    "evolvability",
+    "expected_evolvability",
+    "expected_global_sensitivity",
+    "expected_local_sensitivity",
+    "find_dissimila",
+    "global_sensitivity",
+    "hull_volume",
+    "local_sensitivity",
+    "measure",
+    "measure_all",
+    "niches_of",
+    "one_hot_evolvability",
+    "population_evolvability",
+]

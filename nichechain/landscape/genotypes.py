@@ -1,0 +1,165 @@
+"""Measures of genotypes: make offspring, evaluate them, measure their behaviors."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from nichechain.births import NONE
+from nichechain.domains.base import Domain, Evaluation, check_genotypes
+from nichechain.errors import NichechainError
+from nichechain.landscape.behaviors import (
+    EPSILON,
+    dissimila_ratio,
+    evolvability,
+    expected_evolvability,
+    expected_local_sensitivity,
+    hull_volume,
+    local_sensitivity,
+    one_hot_evolvability,
+)
+from nichechain.randomness import Purpose, keyed
+from nichechain.variation import Mutation
+
+if TYPE_CHECKING:
+    from nichechain.execution import Executor
+    from nichechain.niches import GridNiches
+
+
+@dataclass(frozen=True)
+class LandscapeMeasures:
+    """Local measures of one genotype, from a sample of its offspring.
+
+    Parameters
+    ----------
+    sample_size : int
+        Offspring evaluated.
+    failed : int
+        Those whose evaluation failed, which no measure counts.
+    local_sensitivity, expected_local_sensitivity : float
+        LS and LS*, in units of behavior. LS is a lower bound where mutation is unbounded.
+    evolvability, expected_evolvability : float
+        η and η*, in units of behavior. η is a lower bound where mutation is unbounded.
+    one_hot_evolvability : float, optional
+        d/n; None where there are no niches.
+    ratio, expected_ratio : float
+        r and r*.
+    hull_volume : float
+        Hypervolume of the convex hull of the offspring.
+    """
+
+    sample_size: int
+    failed: int
+    local_sensitivity: float
+    expected_local_sensitivity: float
+    evolvability: float
+    expected_evolvability: float
+    one_hot_evolvability: float | None
+    ratio: float
+    expected_ratio: float
+    hull_volume: float
+
+
+def measure(
+    domain: Domain,
+    genotype: ArrayLike,
+    mutate: Mutation,
+    sample_size: int = 30,
+    seed: int = 0,
+    executor: Executor | None = None,
+    *,
+    niches: GridNiches | None = None,
+    epsilon: float = EPSILON,
+) -> LandscapeMeasures:
+    """All local measures of one genotype (P,); the rest is as in :func:`measure_all`."""
+    genotypes = np.asarray(genotype)[None]
+    return measure_all(
+        domain, genotypes, mutate, sample_size, seed, executor, niches=niches, epsilon=epsilon
+    )[0]
+
+
+def measure_all(
+    domain: Domain,
+    genotypes: ArrayLike,
+    mutate: Mutation,
+    sample_size: int = 30,
+    seed: int = 0,
+    executor: Executor | None = None,
+    *,
+    niches: GridNiches | None = None,
+    epsilon: float = EPSILON,
+) -> tuple[LandscapeMeasures, ...]:
+    """All local measures of several genotypes, evaluated as one batch.
+
+    Parameters
+    ----------
+    domain : Domain
+    genotypes : (G, P) array
+    mutate : Mutation
+    sample_size : int
+        Offspring of each genotype, at least 2.
+    seed : int
+        The i-th child is a function of its parent and this seed, so measures do not depend on
+        which genotypes are measured together. They share the noise of their i-th children.
+    executor : Executor, optional
+        Where to evaluate; by default here.
+    niches : GridNiches, optional
+        For one-hot evolvability.
+    epsilon : float
+        As in :func:`dissimila_ratio`.
+
+    Returns
+    -------
+    tuple of LandscapeMeasures
+
+    Raises
+    ------
+    NichechainError
+        If the genotypes have the wrong length, one of them fails, or the sample is too small.
+    """
+    parents = check_genotypes(genotypes, domain.genotype_length)
+    if sample_size < 2:
+        raise NichechainError(f"sample_size is {sample_size}, but evolvability needs at least 2 offspring")
+    children = [mutate(p, keyed(seed, Purpose.OFFSPRING, i)) for p in parents for i in range(sample_size)]
+    batch = np.concatenate([parents, np.stack(children)])
+    evaluation = domain.evaluate(batch) if executor is None else executor.evaluate(domain, batch)
+    count = len(parents)
+    for number in np.flatnonzero(evaluation.failed[:count]):
+        raise NichechainError(f"genotype {number} failed to evaluate: {evaluation.reasons[number]}")
+    parent, offspring = np.split(evaluation.behavior, [count])
+    offspring = offspring.reshape(count, sample_size, -1)
+    widest, mean = evolvability(offspring), expected_evolvability(offspring)
+    farthest, away = local_sensitivity(parent, offspring), expected_local_sensitivity(parent, offspring)
+    ratio, expected = dissimila_ratio(widest, farthest, epsilon), dissimila_ratio(mean, away, epsilon)
+    failed = evaluation.failed[count:].reshape(count, sample_size).sum(axis=1)
+    covered: list[float] | None = None
+    if niches is not None:
+        landed = niches_of(evaluation, niches)[count:].reshape(count, sample_size)
+        covered = one_hot_evolvability(landed, len(niches)).tolist()
+    return tuple(
+        LandscapeMeasures(
+            sample_size,
+            int(failed[g]),
+            float(farthest[g]),
+            float(away[g]),
+            float(widest[g]),
+            float(mean[g]),
+            None if covered is None else covered[g],
+            float(ratio[g]),
+            float(expected[g]),
+            hull_volume(offspring[g]),
+        )
+        for g in range(count)
+    )
+
+
+def niches_of(evaluation: Evaluation, niches: GridNiches | None) -> NDArray[np.int64]:
+    """State of each evaluated genotype (N,): ``births.NONE`` where it failed or nothing is gridded."""
+    state = np.full(len(evaluation), NONE, np.int64)
+    if niches is not None:
+        fine = ~evaluation.failed
+        state[fine] = niches.of(evaluation.behavior[fine])
+    return state

@@ -1,0 +1,129 @@
+"""Transition counts: a fold over births that merges."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from nichechain import GridNiches, NichechainError, TransitionCounts
+
+# Six niches and the outside, state 6.
+GRID = GridNiches((3, 2), ((0.0, 3.0), (0.0, 2.0)))
+NULL = -1
+
+births = st.lists(st.tuples(st.integers(-1, 6), st.integers(-1, 6)), max_size=60)
+
+
+def _columns(pairs):
+    return [i for i, _ in pairs], [j for _, j in pairs]
+
+
+@given(births)
+def test_every_birth_is_counted_where_it_belongs(pairs):
+    counts = TransitionCounts.from_births(*_columns(pairs), GRID)
+    moves = Counter(pair for pair in pairs if NULL not in pair)
+    expected = [[moves[i, j] for j in range(7)] for i in range(7)]
+    visits = Counter(j for _, j in pairs)
+    np.testing.assert_array_equal(counts.matrix.toarray(), expected)
+    np.testing.assert_array_equal(counts.visits, [visits[j] for j in range(7)])
+    np.testing.assert_array_equal(counts.births, np.sum(expected, axis=1))
+    born, parents = {j for _, j in pairs}, {i for i, _ in moves}
+    assert counts.never_filled == 6 - len(born - {NULL, 6})
+    assert counts.never_parent == len(born - parents - {NULL, 6})
+    assert counts.rows_observed == len(parents - {6})
+    assert counts.births_outside == visits[6]
+
+
+@given(births, births)
+def test_a_merge_is_the_count_of_the_pooled_births(first, second):
+    merged = TransitionCounts.from_births(*_columns(first), GRID) + TransitionCounts.from_births(
+        *_columns(second), GRID
+    )
+    pooled = TransitionCounts.from_births(*_columns(first + second), GRID)
+    np.testing.assert_array_equal(merged.matrix.toarray(), pooled.matrix.toarray())
+    np.testing.assert_array_equal(merged.visits, pooled.visits)
+    assert merged.niches == pooled.niches
+    assert merged.matrix.dtype == merged.visits.dtype == np.int64
+
+
+def test_a_merge_leaves_its_parts_alone():
+    one = TransitionCounts.from_pairs([0, 1], [1, 2], GRID)
+    other = TransitionCounts.from_pairs([0], [1], GRID)
+    merged = one + other
+    assert merged.matrix[0, 1] == 2
+    assert one.matrix[0, 1] == other.matrix[0, 1] == 1
+    assert one.visits.sum() == 2
+
+
+def test_pairs_by_hand():
+    counts = TransitionCounts.from_pairs([0, 0, 5, 6], [1, 1, 6, 0], GRID)
+    assert counts.matrix[0, 1] == 2
+    assert counts.matrix[5, 6] == counts.matrix[6, 0] == 1
+    assert counts.births.tolist() == [2, 0, 0, 0, 0, 1, 1]
+    # Never filled: 2, 3, 4 and 5. Of those filled, only 1 has no children.
+    assert counts.visits.tolist() == [1, 2, 0, 0, 0, 0, 1]
+    assert (counts.never_filled, counts.never_parent, counts.rows_observed) == (4, 1, 2)
+
+
+def test_clipped_niches_have_no_outside():
+    niches = GridNiches((3, 2), ((0.0, 3.0), (0.0, 2.0)), "clip")
+    counts = TransitionCounts.from_pairs([0, 5], [5, 5], niches)
+    assert counts.matrix.shape == (6, 6)
+    assert counts.births_outside == 0
+
+
+def test_no_births_are_counts_as_well():
+    counts = TransitionCounts.from_births([], [], GRID)
+    assert counts.matrix.shape == (7, 7)
+    assert counts.births.sum() == counts.visits.sum() == counts.births_outside == 0
+    assert (counts.never_filled, counts.never_parent, counts.rows_observed) == (6, 0, 0)
+
+
+@pytest.mark.parametrize(
+    ("parent", "child", "message"),
+    [
+        ([0, 1], [0], r"parents have shape \(2,\) and children \(1,\)"),
+        ([[0]], [[0]], r"shape \(1, 1\)"),
+        ([7], [0], "state is 7, but states run from 0 to 6"),
+        ([0], [7], "state is 7"),
+        ([-1], [0], "state is -1"),
+        ([0], [-2], "state is -2"),
+    ],
+)
+def test_pairs_are_refused(parent, child, message):
+    with pytest.raises(NichechainError, match=message):
+        TransitionCounts.from_pairs(parent, child, GRID)
+
+
+@pytest.mark.parametrize(
+    ("parent", "child", "message"),
+    [
+        ([0], [7], "state is 7"),
+        ([9], [0], "state is 9"),
+        # An initial birth, and a child of a parent that does not exist.
+        ([-1], [7], "state is 7"),
+        ([-1], [-2], "state is -2"),
+        ([-2], [0], "state is -2"),
+        ([0, 1], [0], "parents have shape"),
+    ],
+)
+def test_births_are_refused(parent, child, message):
+    with pytest.raises(NichechainError, match=message):
+        TransitionCounts.from_births(parent, child, GRID)
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        GridNiches((2, 3), ((0.0, 3.0), (0.0, 2.0))),
+        GridNiches((3, 2), ((0.0, 3.0), (0.0, 2.5))),
+        GridNiches((3, 2), ((0.0, 3.0), (0.0, 2.0)), "absorb"),
+    ],
+)
+def test_counts_of_other_niches_do_not_merge(other):
+    with pytest.raises(NichechainError, match="niches differ"):
+        TransitionCounts.from_pairs([0], [1], GRID) + TransitionCounts.from_pairs([0], [1], other)

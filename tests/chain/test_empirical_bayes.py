@@ -1,0 +1,203 @@
+"""Empirical Bayes: likeness of siblings, and what rows that have not seen an elite say of its children."""
+
+import itertools
+
+import numpy as np
+import pytest
+from scipy import sparse, stats
+
+from nichechain.chain.base_measure import BaseMeasure
+from nichechain.chain.counts import TransitionCounts
+from nichechain.chain.empirical_bayes import (
+    _left_out,
+    _without_own,
+    design_effect,
+    most_likely,
+    sibling_correlation,
+)
+from nichechain.chain.estimators import estimate
+from nichechain.niches import GridNiches
+
+ROW = GridNiches((4,), ((0.0, 4.0),))
+
+
+def _dense(chain):
+    return chain.T.toarray() if sparse.issparse(chain.T) else np.asarray(chain.T)
+
+
+def _simulate(base, strength, births, seed):
+    """Births of a chain whose rows are Dirichlet(s B), and the chain."""
+    rng = np.random.default_rng(seed)
+    states = base.niches.states
+    truth = np.array([rng.dirichlet(strength * row) for row in base.rows(np.arange(states))])
+    table = np.array([rng.multinomial(births, row / row.sum()) for row in truth])
+    parent, child = np.nonzero(table)
+    pairs = np.repeat(parent, table[parent, child]), np.repeat(child, table[parent, child])
+    return TransitionCounts.from_pairs(*pairs, base.niches), truth
+
+
+def _known_base(weights, shape=(10, 10)):
+    """A base with a few favourite destinations and displacements of a cell or two."""
+    niches = GridNiches(shape, ((0.0, 1.0),) * 2)
+    destination = stats.zipf(1.3).pmf(1 + np.random.default_rng(3).permutation(niches.states))
+    x, y = np.mgrid[1 - shape[0] : shape[0], 1 - shape[1] : shape[1]]
+    kernel = np.exp(-(x**2 + y**2) / 4)
+    return BaseMeasure(
+        niches, destination / destination.sum(), kernel / kernel.sum(), 0.05, np.array(weights)
+    )
+
+
+@pytest.mark.parametrize("strength", [1.0, 5.0, 30.0])
+@pytest.mark.parametrize("weights", [(0.9, 0.05, 0.05), (0.05, 0.9, 0.05), (0.45, 0.45, 0.1)])
+def test_strength_and_mixture_are_learned_from_births(strength, weights):
+    counts, _ = _simulate(_known_base(weights), strength, 100, seed=4)
+    fitted, mixture = most_likely(counts, np.ones(counts.niches.states))
+    # A hundred rows of a hundred births pin s down to a few per cent, if B were known; it is not.
+    assert fitted == pytest.approx(strength, rel=0.35)
+    assert mixture.sum() == pytest.approx(1.0)
+    # Rows of s = 1 have a handful of states each, and their pool is a rough picture of B.
+    np.testing.assert_allclose(mixture, weights, atol=0.3 if strength < 5 else 0.2)
+
+
+def test_the_learned_strength_is_near_the_most_likely_one_for_the_true_base():
+    base = _known_base((0.45, 0.45, 0.1))
+    counts, _ = _simulate(base, 5.0, 60, seed=8)
+    table = counts.matrix.toarray()
+    rows = base.rows(np.arange(101))
+    strengths = np.geomspace(0.5, 50, 81)
+    # scipy's Dirichlet-multinomial, row by row.
+    likelihood = [
+        sum(stats.dirichlet_multinomial.logpmf(row, s * b, 60) for row, b in zip(table, rows, strict=True))
+        for s in strengths
+    ]
+    assert most_likely(counts, np.ones(counts.niches.states))[0] == pytest.approx(
+        strengths[np.argmax(likelihood)], rel=0.3
+    )
+
+
+def test_the_estimate_is_nearly_as_near_to_the_truth_as_can_be():
+    base = _known_base((0.45, 0.45, 0.1))
+    counts, truth = _simulate(base, 5.0, 10, seed=1)
+    # The posterior mean under the strength and the base that rows were drawn with: by Bayes, no
+    # estimate has a smaller expected squared error.
+    best = (counts.matrix.toarray() + 5.0 * base.rows(np.arange(101))) / 15.0
+    estimates = (best, estimate(counts).T, _dense(estimate(counts, "mle")))
+    errors = [((matrix - truth) ** 2).sum(axis=1).mean() for matrix in estimates]
+    assert errors[0] < errors[1] < 1.05 * errors[0]
+    assert errors[2] > 1.3 * errors[0]
+
+
+def test_a_row_does_not_vouch_for_itself():
+    # What the pool says of a row's births, with that row's births out of the pool: the base measure
+    # of all other rows' births.
+    niches = GridNiches((5, 4), ((0.0, 1.0), (0.0, 1.0)))
+    rng = np.random.default_rng(6)
+    parent = rng.integers(21, size=150)
+    child = np.where(rng.random(150) < 0.6, np.minimum(parent + 1, 20), rng.integers(21, size=150))
+    counts = TransitionCounts.from_pairs(parent, child, niches)
+    weights = np.array([0.5, 0.4, 0.1])
+    entries = counts.matrix.tocoo()
+    i, j = (axis.astype(np.int64) for axis in entries.coords)
+    found = _without_own(counts, i, j)
+    for column, (row, state) in enumerate(zip(i, j, strict=True)):
+        others = TransitionCounts.from_pairs(parent[parent != row], child[parent != row], niches)
+        expected = BaseMeasure.pooled(others, weights).components(np.array([row]), np.array([state]))[:, 0]
+        np.testing.assert_allclose(found[:, column], np.maximum(expected, 1e-12), rtol=1e-9, atol=1e-11)
+
+
+def _families(concentration, elites, children, seed):
+    """Births of elites whose own rows are Dirichlet(K T_i) around their niche's."""
+    rng = np.random.default_rng(seed)
+    niches = GridNiches((20,), ((0.0, 1.0),))
+    truth = rng.dirichlet(np.full(21, 0.3), 21)
+    parent = np.repeat(np.arange(21), elites)
+    rows = [rng.dirichlet(concentration * truth[i] + 1e-9) for i in parent]
+    child = np.array([rng.choice(21, size=children, p=row / row.sum()) for row in rows])
+    elite = np.repeat(np.arange(parent.size), children)
+    return TransitionCounts.from_births(np.repeat(parent, children), child.ravel(), niches, elite=elite)
+
+
+@pytest.mark.parametrize("concentration", [1.0, 4.0, 20.0])
+def test_siblings_are_as_alike_as_they_were_made(concentration):
+    # Two draws from Dirichlet(K p) agree with probability (1 + K Σ p²) / (1 + K): beyond the Σ p² of
+    # strangers, that is 1 / (1 + K) of what it could be.
+    counts = _families(concentration, elites=60, children=12, seed=2)
+    rho = sibling_correlation(counts)
+    assert rho == pytest.approx(1 / (1 + concentration), abs=0.03)
+    np.testing.assert_allclose(design_effect(counts), 1 + 11 * rho)
+
+
+def test_births_of_their_own_are_worth_one_each():
+    counts = _families(2.0, elites=300, children=1, seed=3)
+    assert sibling_correlation(counts) == 0.0
+    np.testing.assert_array_equal(design_effect(counts), 1.0)
+    unsaid = TransitionCounts.from_pairs([0, 0, 1], [1, 2, 2], ROW)
+    np.testing.assert_array_equal(design_effect(unsaid), 1.0)
+
+
+def test_correlation_by_listing_every_pair():
+    rng = np.random.default_rng(7)
+    parent = rng.integers(4, size=60)
+    elite = 10 * parent + rng.integers(3, size=60)
+    child = (elite + rng.integers(2, size=60)) % 4
+    counts = TransitionCounts.from_births(parent, child, ROW, elite=elite)
+    pairs, siblings, cousins = np.zeros(4), np.zeros((4, 2)), np.zeros((4, 2))
+    for a, b in itertools.permutations(range(60), 2):
+        if parent[a] == parent[b]:
+            kind = siblings if elite[a] == elite[b] else cousins
+            kind[parent[a]] += (1, child[a] == child[b])
+    pairs = siblings[:, 0]
+    of_siblings = siblings[:, 1].sum() / pairs.sum()
+    of_cousins = (pairs * cousins[:, 1] / cousins[:, 0]).sum() / pairs.sum()
+    expected = (of_siblings - of_cousins) / (1 - of_cousins)
+    assert expected > 0
+    assert sibling_correlation(counts) == pytest.approx(expected)
+
+
+def test_every_birth_is_foretold_once_and_without_its_family():
+    parent = np.array([0, 0, 0, 0, 2, 2, 3, -1])
+    child = np.array([1, 1, 2, 0, 2, 2, -1, 3])
+    elite = np.array([5, 5, 5, 6, 7, 8, 9, -1])
+    known = TransitionCounts.from_births(parent, child, ROW, elite=elite)
+    both = known + TransitionCounts.from_pairs([2, 2, 1], [2, 2, 0], ROW)
+    left = _left_out(both)
+    assert left.weight.sum() == both.births.sum() == 9
+    rows = {tuple(row) for row in np.stack([left.parent, left.child, left.children, left.family]).T}
+    # Two families in niche 0, two only children in 2; births without a family stand alone.
+    assert rows == {(0, 1, 2, 3), (0, 2, 1, 3), (0, 0, 1, 1), (2, 2, 1, 1), (1, 0, 1, 1)}
+
+
+def test_merged_runs_keep_their_elites_apart():
+    one = TransitionCounts.from_births([0, 0, 1], [1, 1, 2], ROW, elite=[0, 0, 1])
+    pooled = one + one
+    assert pooled.families[:, 3].tolist() == [2, 1, 2, 1]
+    assert np.unique(pooled.families[:, 1]).size == 4
+    assert (pooled.matrix.toarray() == 2 * one.matrix.toarray()).all()
+
+
+def test_likeness_of_siblings_is_not_taken_for_a_difference_between_niches():
+    # All niches alike, elites not: each elite of a niche sends its eight children to one place.
+    rng = np.random.default_rng(5)
+    niches = GridNiches((20,), ((0.0, 1.0),))
+    elite = np.repeat(np.arange(120), 8)
+    child = np.repeat(rng.integers(20, size=120), 8)
+    counts = TransitionCounts.from_births(elite % 20, child, niches, elite=elite)
+    assert sibling_correlation(counts) == pytest.approx(1.0, abs=0.02)
+    with_families, _ = most_likely(counts, design_effect(counts))
+    without, _ = most_likely(TransitionCounts.from_pairs(elite % 20, child, niches), np.ones(21))
+    assert with_families > 50 * without
+
+
+def test_a_posterior_of_related_births_is_wider():
+    counts = _families(1.0, elites=6, children=30, seed=8)
+    unsaid = TransitionCounts(counts.matrix, counts.niches, counts.visits)
+    related, independent = estimate(counts, strength=5.0), estimate(unsaid, strength=5.0)
+    spread = [
+        np.std([np.asarray(_sample(chain, k))[3, 3] for k in range(300)]) for chain in (related, independent)
+    ]
+    assert spread[0] > 1.5 * spread[1]
+
+
+def _sample(chain, seed):
+    drawn = chain.posterior.draw(np.random.default_rng(seed))
+    return drawn.toarray() if sparse.issparse(drawn) else drawn
