@@ -132,7 +132,7 @@ def _empirical_bayes(counts: TransitionCounts, strength: float | None) -> NicheC
     births = counts.births
     typical = (births * effect).sum() / max(1, births.sum())
     return _estimated(
-        counts, posterior, f"empirical-bayes, strength {fitted:.3g}, {typical:.3g} births worth one"
+        counts, posterior, f"empirical-bayes, strength {fitted:.3g}, {typical:.2g} births count as one"
     )
 
 

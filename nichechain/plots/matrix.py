@@ -64,7 +64,10 @@ def plot_transitions(archive: Archive, chain: NicheChain, ax: Axes) -> Axes:
         for border in np.flatnonzero(np.diff(_first_index(archive, states))):
             axis(border + 0.5, color=EMPTY, linewidth=0.6, zorder=0.5)
     colorbar(ax, picture, f"probability (white: under {_SMALLEST:g})")
-    ax.set_title(f"T: {rows.size} rows with births, {columns.size} states visited ({chain.estimator})")
+    ax.set_title(
+        f"T: {rows.size} rows with births, {columns.size} states visited\n{chain.estimator}",
+        fontsize="medium",
+    )
     ax.tick_params(length=2, color=INK)
     return ax
 

@@ -53,7 +53,7 @@ def plot_reachability(archive: Archive, chain: NicheChain, ax: Axes, *, threshol
     falls = [edge for edge in drawn if edge[1] == back]
     near = [edge for edge in drawn if edge[1] != back and not graph.edges[edge]["long_jump"]]
     far = [edge for edge in drawn if edge[1] != back and graph.edges[edge]["long_jump"]]
-    _arrows(ax, graph, falls, FAINT, 1)
+    _arrows(ax, graph, falls, FAINT, 1, widest=1.0)
     _arrows(ax, graph, near, EDGE, 2)
     _arrows(ax, graph, far, LONG_JUMP, 3)
     _nodes(ax, graph)
@@ -110,7 +110,9 @@ def _nodes(ax: Axes, graph: nx.DiGraph) -> None:
     colorbar(ax, dots, "probability that a child stays in the niche")
 
 
-def _arrows(ax: Axes, graph: nx.DiGraph, edges: list[tuple[int, int]], color: str, layer: int) -> None:
+def _arrows(
+    ax: Axes, graph: nx.DiGraph, edges: list[tuple[int, int]], color: str, layer: int, widest: float = _WIDEST
+) -> None:
     from matplotlib.patches import FancyArrowPatch
 
     for i, j in sorted(edges, key=lambda edge: graph.edges[edge]["probability"]):
@@ -124,7 +126,7 @@ def _arrows(ax: Axes, graph: nx.DiGraph, edges: list[tuple[int, int]], color: st
                 connectionstyle="arc3,rad=0.12",
                 arrowstyle="-|>",
                 mutation_scale=4 + 5 * strength,
-                linewidth=0.3 + _WIDEST * strength,
+                linewidth=0.3 + widest * strength,
                 alpha=0.12 + 0.75 * strength,
                 color=color,
                 shrinkA=3,
