@@ -89,7 +89,14 @@ class Archive:
     @cached_property
     def domain(self) -> Domain:
         """The domain that the archive was built on."""
-        return self._domain or domains.make(self.config.domain, seed=self.config.domain_seed)
+        domain = self._domain or domains.make(self.config.domain, seed=self.config.domain_seed)
+        length = self.elites.genotype.shape[1]
+        if domain.genotype_length != length:
+            raise NichechainError(
+                f"{self.folder} has genotypes of {length} parameters, but {domain.name} has "
+                f"{domain.genotype_length}: give load() the domain that it was built on"
+            )
+        return domain
 
     @cached_property
     def mutate(self) -> variation.AdditiveMutation:

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import copy
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from functools import partial
+from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,6 +17,7 @@ if TYPE_CHECKING:
     from torch import nn
 
 Float32s = NDArray[np.float32]
+Policy: TypeAlias = Callable[[ArrayLike], Float32s]
 
 IDENTITY, RELU, TANH = 0, 1, 2
 _ACTIVATIONS = {"identity": IDENTITY, "relu": RELU, "tanh": TANH}
@@ -56,6 +60,37 @@ def tanh(values: Float32s) -> Float32s:
     return np.where(size < TANH_LINEAR, values, result)
 
 
+class Controller(Protocol):
+    """A network that flat genotypes hold the parameters of."""
+
+    @property
+    def inputs(self) -> int:
+        """Length of an observation."""
+        ...
+
+    @property
+    def outputs(self) -> int:
+        """Length of an action."""
+        ...
+
+    @property
+    def genotype_length(self) -> int:
+        """Number of evolved parameters."""
+        ...
+
+    def sample(self, n: int, seed: int | np.random.Generator) -> Float32s:
+        """Initial genotypes, (n, genotype_length)."""
+        ...
+
+    def policy(self, genotype: ArrayLike) -> Policy:
+        """From observations (N, inputs) to actions (N, outputs); a row's bits are its own."""
+        ...
+
+    def module(self, genotype: ArrayLike) -> nn.Module:
+        """The controller as a torch module, with the genotype's parameters."""
+        ...
+
+
 @dataclass(frozen=True)
 class MLP:
     """A fully connected network and the layout of its genotype.
@@ -64,8 +99,10 @@ class MLP:
     ----------
     sizes : tuple of int
         Units of the input, of every hidden layer and of the output.
-    hidden, output : {"relu", "tanh", "identity"}
-        Activations of the hidden layers and of the output.
+    hidden : {"relu", "tanh", "identity"} or tuple of them
+        Activation of the hidden layers, or of each of them.
+    output : {"relu", "tanh", "identity"}
+        Activation of the output.
     evolve_biases : bool
         Whether biases are part of the genotype. By default they stay 0: the paper starts them
         there and says that "only the weights are updated".
@@ -77,16 +114,65 @@ class MLP:
     """
 
     sizes: tuple[int, ...] = (25, 32, 32, 4)
-    hidden: str = "relu"
+    hidden: str | tuple[str, ...] = "relu"
     output: str = "tanh"
     evolve_biases: bool = False
 
     def __post_init__(self) -> None:
         if len(self.sizes) < 2 or min(self.sizes) < 1:
             raise NichechainError(f"layer sizes are {self.sizes}, but two or more positive ones are needed")
-        for name in (self.hidden, self.output):
+        if not isinstance(self.hidden, str) and len(self.hidden) != len(self.sizes) - 2:
+            raise NichechainError(
+                f"hidden has {len(self.hidden)} activations, "
+                f"but there are {len(self.sizes) - 2} hidden layers"
+            )
+        for name in self._names:
             if name not in _ACTIVATIONS:
                 raise NichechainError(f"activation is {name!r}, but must be one of {', '.join(_ACTIVATIONS)}")
+
+    @classmethod
+    def of(cls, module: nn.Module, *, evolve_biases: bool = False) -> MLP | None:
+        """The layout of a stack of linear layers with ReLU or tanh; None for any other module.
+
+        Parameters
+        ----------
+        module : torch.nn.Module
+            Only its architecture matters, not its parameters.
+        evolve_biases : bool
+        """
+        from torch import nn
+
+        names = {nn.ReLU: "relu", nn.Tanh: "tanh", nn.Identity: "identity"}
+        sizes: list[int] = []
+        activations: list[str] = []
+        for layer in module if isinstance(module, nn.Sequential) else [module]:
+            if isinstance(layer, nn.Linear) and layer.bias is not None:
+                sizes += [layer.in_features] if not sizes else []
+                sizes.append(layer.out_features)
+                activations.append("identity")
+            elif type(layer) in names and activations and activations[-1] == "identity":
+                activations[-1] = names[type(layer)]
+            else:
+                return None
+        if len(sizes) < 2:
+            return None
+        return cls(tuple(sizes), tuple(activations[:-1]), activations[-1], evolve_biases)
+
+    @property
+    def _names(self) -> tuple[str, ...]:
+        """Activation of every layer."""
+        hidden = (self.hidden,) * (len(self.sizes) - 2) if isinstance(self.hidden, str) else self.hidden
+        return (*hidden, self.output)
+
+    @property
+    def inputs(self) -> int:
+        """Length of an observation."""
+        return self.sizes[0]
+
+    @property
+    def outputs(self) -> int:
+        """Length of an action."""
+        return self.sizes[-1]
 
     @property
     def genotype_length(self) -> int:
@@ -97,8 +183,7 @@ class MLP:
     @property
     def activations(self) -> NDArray[np.int64]:
         """Activation code of every layer."""
-        names = [self.hidden] * (len(self.sizes) - 2) + [self.output]
-        return np.array([_ACTIVATIONS[name] for name in names], np.int64)
+        return np.array([_ACTIVATIONS[name] for name in self._names], np.int64)
 
     def parameters(self, genotype: ArrayLike) -> Float32s:
         """All weights and biases, flat: the genotype with the fixed biases put in.
@@ -156,6 +241,10 @@ class MLP:
             units = np.maximum(total, 0) if code == RELU else tanh(total) if code == TANH else total
         return units
 
+    def policy(self, genotype: ArrayLike) -> Policy:
+        """:meth:`actions` of one genotype."""
+        return partial(self.actions, genotype)
+
     def sample(self, n: int, seed: int | np.random.Generator) -> Float32s:
         """Genotypes with Xavier normal weights and biases 0.
 
@@ -195,9 +284,90 @@ class MLP:
         modules: dict[str, Any] = {"relu": nn.ReLU, "tanh": nn.Tanh, "identity": nn.Identity}
         layers: list[nn.Module] = []
         for inputs, outputs in zip(self.sizes, self.sizes[1:], strict=False):
-            layers += [nn.Linear(inputs, outputs), modules[self.hidden]()]
-        layers[-1] = modules[self.output]()
+            layers += [nn.Linear(inputs, outputs), modules[self._names[len(layers) // 2]]()]
         network = nn.Sequential(*layers)
         flat = torch.from_numpy(self.parameters(genotype).copy())
         nn.utils.vector_to_parameters(flat, network.parameters())
         return network
+
+
+class ModuleController:
+    """Any torch module as a controller: slower than :class:`MLP`, since Python runs every step.
+
+    Parameters
+    ----------
+    module : torch.nn.Module
+        From (1, inputs) float32 observations to (1, outputs) actions, deterministic.
+    inputs, outputs : int
+        Length of an observation and of an action.
+
+    Notes
+    -----
+    A genotype holds all of ``module.parameters()``, biases included, in their order.
+    """
+
+    def __init__(self, module: nn.Module, inputs: int, outputs: int) -> None:
+        self._module = module
+        self.inputs = inputs
+        self.outputs = outputs
+        self.genotype_length = sum(parameter.numel() for parameter in module.parameters())
+
+    def sample(self, n: int, seed: int | np.random.Generator) -> Float32s:
+        """Genotypes with Xavier normal weights, and parameters of one dimension 0.
+
+        Parameters
+        ----------
+        n : int
+        seed : int or numpy.random.Generator
+
+        Returns
+        -------
+        (n, genotype_length) float32 array
+        """
+        import torch
+
+        generator = torch.Generator().manual_seed(int(np.random.default_rng(seed).integers(2**63)))
+        genotypes = np.zeros((n, self.genotype_length), np.float32)
+        for row in genotypes:
+            start = 0
+            for parameter in self._module.parameters():
+                if parameter.dim() > 1:
+                    weight = torch.empty_like(parameter.detach())
+                    torch.nn.init.xavier_normal_(weight, generator=generator)
+                    row[start : start + weight.numel()] = weight.numpy().ravel()
+                start += parameter.numel()
+        return genotypes
+
+    def module(self, genotype: ArrayLike) -> nn.Module:
+        """A copy of the module with the genotype's parameters.
+
+        Raises
+        ------
+        NichechainError
+            If the genotype has the wrong length.
+        """
+        import torch
+
+        flat = np.array(genotype, np.float32)
+        if flat.shape != (self.genotype_length,):
+            raise NichechainError(
+                f"genotype has shape {flat.shape}, but this controller's has ({self.genotype_length},)"
+            )
+        made = copy.deepcopy(self._module)
+        torch.nn.utils.vector_to_parameters(torch.from_numpy(flat), made.parameters())
+        return made
+
+    def policy(self, genotype: ArrayLike) -> Policy:
+        """From observations (N, inputs) to actions (N, outputs), one row at a time."""
+        import torch
+
+        module = self.module(genotype)
+
+        def act(observations: ArrayLike) -> Float32s:
+            rows = torch.from_numpy(np.array(observations, np.float32))
+            with torch.no_grad():
+                # A batched product may round otherwise than the product of one row.
+                actions = torch.cat([module(row[None]) for row in rows])
+            return actions.numpy().astype(np.float32)
+
+        return act

@@ -5,17 +5,22 @@ from __future__ import annotations
 import contextlib
 import copy
 import io
+import logging
 import warnings
 from dataclasses import dataclass
+from pathlib import Path
+from types import ModuleType
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from nichechain.controllers import MLP
+from nichechain.controllers import MLP, Controller
 
 if TYPE_CHECKING:
     import mujoco
+
+_log = logging.getLogger(__name__)
 
 # Warnings after which a state no longer follows from the last by the laws of the model.
 _FATAL_WARNINGS = ("CONTACTFULL", "CNSTRFULL", "BADQPOS", "BADQVEL", "BADQACC")
@@ -45,12 +50,12 @@ class FetchEpisodes(Protocol):
     inputs: int
     goal: NDArray[np.float64]
 
-    def run(self, controller: MLP, genotype: NDArray[np.float32], steps: int) -> Episode:
+    def run(self, controller: Controller, genotype: NDArray[np.float32], steps: int) -> Episode:
         """One episode; safe to call from several threads."""
         ...
 
 
-def fetch_episodes(env_id: str, seed: int) -> FetchEpisodes:
+def fetch_episodes(env_id: str, seed: int, controller: Controller) -> FetchEpisodes:
     """The fastest way this machine has to run episodes of a Fetch environment.
 
     Parameters
@@ -59,7 +64,11 @@ def fetch_episodes(env_id: str, seed: int) -> FetchEpisodes:
         A Fetch environment of gymnasium-robotics.
     seed : int
         Seed of the environment's reset.
+    controller : Controller
+        What will run: only an :class:`MLP` runs natively.
     """
+    if not isinstance(controller, MLP):
+        return SteppedFetch(env_id, seed)
     try:
         return NativeFetch(env_id, seed)
     except (ImportError, OSError, AttributeError, RuntimeError) as error:
@@ -87,15 +96,16 @@ class SteppedFetch:
         self.inputs = int(first["observation"].size)
         self.goal = np.array(first["desired_goal"])
 
-    def run(self, controller: MLP, genotype: NDArray[np.float32], steps: int) -> Episode:
+    def run(self, controller: Controller, genotype: NDArray[np.float32], steps: int) -> Episode:
         """One episode; every thread has an environment of its own."""
+        policy = controller.policy(genotype)
         # list.pop and list.append are atomic, so the list is a pool without a lock.
         env = self._idle.pop() if self._idle else _make(self._env_id)
         observation, _ = env.reset(seed=self._seed)
         observations = [observation["observation"]]
-        actions = np.empty((steps, controller.sizes[-1]), np.float32)
+        actions = np.empty((steps, controller.outputs), np.float32)
         for t in range(steps):
-            actions[t] = controller.actions(genotype, observations[-1][None])[0]
+            actions[t] = policy(observations[-1][None])[0]
             observation, *_ = env.step(actions[t])
             observations.append(observation["observation"])
         failure = _failure(env.unwrapped.data)
@@ -121,6 +131,8 @@ class NativeFetch:
     def __init__(self, env_id: str, seed: int) -> None:
         from nichechain.engine import episode, libraries
 
+        if not _is_compiled(episode):
+            _log.warning("compiling the engine for Fetch episodes, once; it takes about 20 seconds")
         self._run = episode.run
         self._functions = libraries.load().as_array()
         env = _make(env_id)
@@ -136,14 +148,15 @@ class NativeFetch:
         self._ids, self._actuator_qpos = _addresses(self._model, unwrapped._model_names.joint_names)
         self._idle: list[mujoco.MjData] = []
 
-    def run(self, controller: MLP, genotype: NDArray[np.float32], steps: int) -> Episode:
+    def run(self, controller: Controller, genotype: NDArray[np.float32], steps: int) -> Episode:
         """One episode; every thread has an mjData of its own."""
+        assert isinstance(controller, MLP)
         import mujoco
 
         # list.pop and list.append are atomic, so the list is a pool without a lock.
         data = self._idle.pop() if self._idle else mujoco.MjData(self._model)
         observations = np.empty((steps + 1, self.inputs))
-        actions = np.empty((steps, controller.sizes[-1]), np.float32)
+        actions = np.empty((steps, controller.outputs), np.float32)
         self._run(
             self._functions,
             self._model._address,
@@ -174,6 +187,13 @@ class NativeFetch:
         failure = _failure(data)
         self._idle.append(data)
         return Episode(observations, actions, failure)
+
+
+def _is_compiled(episode: ModuleType) -> bool:
+    """Whether numba has kept machine code of the episode that is newer than its source."""
+    kept = Path(episode.run.stats.cache_path).glob("episode.run-*.nbi")
+    source = Path(str(episode.__file__)).stat().st_mtime
+    return any(index.stat().st_mtime >= source for index in kept)
 
 
 def _make(env_id: str) -> Any:

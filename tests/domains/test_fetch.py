@@ -74,7 +74,7 @@ def test_pickles_without_its_physics(domain: FetchPickAndPlace, genotypes: NDArr
     content = pickle.dumps(domain)
     assert len(content) < 1000
     copy = pickle.loads(content)
-    assert repr(copy) == repr(domain) == "FetchPickAndPlace(seed=0, evolve_biases=False)"
+    assert repr(copy) == repr(domain) == "FetchPickAndPlace(seed=0, 1952 parameters)"
     assert_same(copy.evaluate(genotypes[:2]), before)
     other = pickle.loads(pickle.dumps(FetchPickAndPlace(seed=5, evolve_biases=True)))
     assert (other.seed, other.genotype_length) == (5, 2020)

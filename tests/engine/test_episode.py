@@ -88,7 +88,7 @@ def assert_parity(domain: FetchPickAndPlace, genotypes: NDArray[np.float32]) -> 
     assert not evaluation.failed.any()
     moved = 0
     for genotype, behavior in zip(genotypes, evaluation.behavior, strict=True):
-        reference = stepped(env, domain.seed, domain.mlp, genotype)
+        reference = stepped(env, domain.seed, domain.network, genotype)
         assert_same_bits(domain.episode(genotype), reference)
         np.testing.assert_array_equal(
             behavior.view(np.int64), np.ascontiguousarray(reference.observations[-1, 3:5]).view(np.int64)
@@ -100,13 +100,13 @@ def assert_parity(domain: FetchPickAndPlace, genotypes: NDArray[np.float32]) -> 
 
 
 def test_bits_equal_those_of_gymnasium_robotics(domain: FetchPickAndPlace) -> None:
-    assert assert_parity(domain, policies(domain.mlp, 24, seed=1)) >= 8
+    assert assert_parity(domain, policies(domain.network, 24, seed=1)) >= 8
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [2, 3])
 def test_bits_of_a_hundred_policies(domain: FetchPickAndPlace, seed: int) -> None:
-    assert assert_parity(domain, policies(domain.mlp, 100, seed)) >= 30
+    assert assert_parity(domain, policies(domain.network, 100, seed)) >= 30
 
 
 def test_bits_from_another_reset() -> None:
@@ -139,7 +139,7 @@ def test_bits_of_the_other_fetch_tasks(env_id: str) -> None:
 
 def test_episodes_leave_nothing_behind(domain: FetchPickAndPlace) -> None:
     """The pooled physics state starts every episode anew, whatever ran before."""
-    genotypes = policies(domain.mlp, 4, seed=9)
+    genotypes = policies(domain.network, 4, seed=9)
     before = [domain.episode(genotype) for genotype in genotypes]
     after = [domain.episode(genotype) for genotype in genotypes[::-1]][::-1]
     for first, second in zip(before, after, strict=True):
@@ -159,7 +159,7 @@ def test_stepped_episodes_have_the_bits_of_native_ones() -> None:
 def test_falls_back_to_gymnasium_with_a_warning(
     domain: FetchPickAndPlace, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    genotypes = policies(domain.mlp, 3, seed=11)
+    genotypes = policies(domain.network, 3, seed=11)
     native = domain.evaluate(genotypes)
 
     def unavailable() -> None:
@@ -167,7 +167,7 @@ def test_falls_back_to_gymnasium_with_a_warning(
 
     monkeypatch.setattr(libraries, "load", unavailable)
     with pytest.warns(RuntimeWarning, match="slower: this machine is imaginary"):
-        episodes = fetch_episodes("FetchPickAndPlace-v4", 0)
+        episodes = fetch_episodes("FetchPickAndPlace-v4", 0, MLP())
     assert isinstance(episodes, SteppedFetch)
     with pytest.warns(RuntimeWarning, match="stepped through Gymnasium"):
         fallback = FetchPickAndPlace().evaluate(genotypes)
@@ -178,7 +178,7 @@ def test_falls_back_to_gymnasium_with_a_warning(
 def test_native_episodes_are_what_this_machine_gets() -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error", RuntimeWarning)
-        assert isinstance(fetch_episodes("FetchPickAndPlace-v4", 0), NativeFetch)
+        assert isinstance(fetch_episodes("FetchPickAndPlace-v4", 0, MLP()), NativeFetch)
 
 
 def test_fatal_physics_warnings_are_named() -> None:
