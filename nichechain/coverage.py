@@ -157,8 +157,8 @@ def sampled_coverage(
         raise NichechainError(f"repeats is {repeats}, but at least 1 is needed")
     states = transition.shape[0]
     niches = states if counted is None else counted
-    step = _RowSampler(sparse.csr_array(transition))
-    start = _RowSampler(sparse.csr_array(first[None, :]))
+    step = RowSampler(sparse.csr_array(transition))
+    start = RowSampler(sparse.csr_array(first[None, :]))
     at_once = max(1, _SIMULATION_CELLS // max(states, lineages))
     found = []
     for done in range(0, repeats, at_once):
@@ -232,8 +232,13 @@ def _at_least_once(probability: Floats, trials: int) -> Floats:
     return some
 
 
-class _RowSampler:
-    """Draws columns of a row-stochastic matrix by inverting its rows' distribution functions."""
+class RowSampler:
+    """Draws columns of a row-stochastic matrix by inverting its rows' distribution functions.
+
+    Parameters
+    ----------
+    matrix : (m, S) scipy.sparse.csr_array
+    """
 
     def __init__(self, matrix: sparse.csr_array) -> None:
         matrix = matrix.copy()
@@ -249,6 +254,7 @@ class _RowSampler:
         self._columns = matrix.indices
 
     def draw(self, rows: Ints, rng: np.random.Generator) -> Ints:
+        """One column for each row (N,), drawn with the row's probabilities, (N,)."""
         # The sum could round up to the next row's interval.
         at = np.minimum(rows + rng.random(rows.size), np.nextafter(rows + 1.0, 0.0))
         found = np.searchsorted(self._upper, at, side="right")

@@ -9,6 +9,7 @@ from typing import Literal, TypeAlias, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from nichechain.chain.draws import generations
 from nichechain.chain.model import Matrix, NicheChain
 from nichechain.coverage import check_lengths, expected_coverage, sampled_coverage
 from nichechain.errors import NichechainError
@@ -39,20 +40,20 @@ def one_root(
     seed: int,
 ) -> Evolvability:
     """Evolvability of one root over samples of T and of the distribution of generation 1."""
-    generations = states_counted(l, convention)
+    states_counted = generations(l, convention)
     n = chain.n_niches
     means, errors, saturated = [], [], False
     for number, (matrix, first) in enumerate(samples):
         if method == "exact":
-            covered, endless = expected_coverage(matrix, first, generations, [lineages, ENDLESS], counted=n)[
-                0
-            ]
+            covered, endless = expected_coverage(
+                matrix, first, states_counted, [lineages, ENDLESS], counted=n
+            )[0]
             saturated |= bool(covered > SATURATED * endless)
             means.append(covered)
             errors.append(0.0)
         else:
             rng = keyed(seed, Purpose.WALKS, number)
-            sampled = sampled_coverage(matrix, first[0], generations, lineages, repeats, rng, counted=n)
+            sampled = sampled_coverage(matrix, first[0], states_counted, lineages, repeats, rng, counted=n)
             means.append(sampled.mean())
             errors.append(standard_error(sampled))
     value, error, low, high = (float(x) for x in summary(np.array(means), np.array(errors)))
@@ -67,12 +68,6 @@ def standard_error(sampled: NDArray[np.int64]) -> float:
     return float(sampled.std(ddof=1) / math.sqrt(size)) if size > 1 else math.nan
 
 
-def row_of(matrix: Matrix, state: int) -> Floats:
-    """Row of T as (1, S)."""
-    row: Floats = matrix[[state]] if isinstance(matrix, np.ndarray) else matrix[[state]].toarray()
-    return row
-
-
 def summary(means: Floats, errors: Floats) -> tuple[Floats, Floats, Floats, Floats]:
     """Mean over the draws along axis 0, its standard error, and the interval."""
     size = len(means)
@@ -81,20 +76,6 @@ def summary(means: Floats, errors: Floats) -> tuple[Floats, Floats, Floats, Floa
         return means[0], errors[0], low, high
     # The spread of the draws' means already has the simulations' error in it.
     return means.mean(axis=0), means.std(axis=0, ddof=1) / math.sqrt(size), low, high
-
-
-def transitions(chain: NicheChain, draws: int, seed: int) -> Iterator[Matrix]:
-    """T itself where it is given, draws from its posterior where it is estimated with one."""
-    if chain.posterior is None:
-        yield chain.T
-    else:
-        for number in range(draws):
-            yield chain.posterior.draw(keyed(seed, Purpose.POSTERIOR, number))
-
-
-def states_counted(l: int, convention: str) -> int:  # noqa: E741
-    """States of a walk that count. Under ``procedure`` the root's own state is one of them."""
-    return l + 1 if convention == "procedure" else l
 
 
 def repeats_per_draw(repeats: int, chain: NicheChain, draws: int) -> int:

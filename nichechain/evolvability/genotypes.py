@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from nichechain.chain.draws import Root, transition_draws
 from nichechain.chain.model import NicheChain
 from nichechain.coverage import rarefied_coverage
 from nichechain.errors import NichechainError
@@ -22,8 +23,6 @@ from nichechain.evolvability.averaging import (
     Sample,
     check,
     one_root,
-    row_of,
-    transitions,
 )
 from nichechain.evolvability.results import Evolvability
 from nichechain.randomness import Purpose, keyed
@@ -111,8 +110,10 @@ def genotype_evolvability(
     if strength is None:
         strength = 1.0 if chain.posterior is None else chain.posterior.strength
 
+    root = Root(chain, niche=elite.state)
+
     def samples() -> Iterator[Sample]:
-        matrices = transitions(chain, draws, seed)
+        matrices = transition_draws(chain, draws, seed)
         if chain.posterior is None and first_generation == "posterior":
             # T is given, but D is not.
             matrices = itertools.repeat(chain.T, draws)
@@ -121,8 +122,8 @@ def genotype_evolvability(
                 yield matrix, counts[None, :] / observed
                 continue
             rng = keyed(seed, Purpose.FIRST_GENERATION, number)
-            weight = rng.standard_gamma(counts + strength * row_of(matrix, elite.state))
-            yield matrix, weight / weight.sum()
+            weight = rng.standard_gamma(counts + strength * root.first(matrix, "definition"))
+            yield matrix, (weight / weight.sum())[None, :]
 
     drawn = chain.posterior is not None or first_generation == "posterior"
     size = max(1, math.ceil(repeats / draws)) if drawn else repeats

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
+from nichechain.chain.draws import Root, generations, transition_draws
 from nichechain.chain.model import Matrix, NicheChain
 from nichechain.coverage import expected_coverage, sampled_coverage
-from nichechain.errors import NichechainError
 from nichechain.evolvability.averaging import (
     DRAWS,
     ENDLESS,
@@ -20,11 +20,8 @@ from nichechain.evolvability.averaging import (
     check,
     one_root,
     repeats_per_draw,
-    row_of,
     standard_error,
-    states_counted,
     summary,
-    transitions,
 )
 from nichechain.evolvability.results import Evolvability, NicheEvolvability
 from nichechain.niches import Niche
@@ -84,22 +81,14 @@ def l_evolvability(
     Source: the paper's section "Towards better evolvability definitions".
     """
     check(l, lineages, method, convention, repeats, draws)
-    if (niche is None) == (offspring is None):
-        raise NichechainError("give either a niche or the distribution of the offspring, and only one")
-    size = repeats_per_draw(repeats, chain, draws)
-    if niche is None:
-        first = _distribution(offspring, chain)
-        samples = ((matrix, first) for matrix in transitions(chain, draws, seed))
-        return one_root(chain, samples, l, lineages, method, convention, size, seed)
-    state = chain.state(niche)
-    standing = np.zeros((1, chain.states))
-    standing[0, state] = 1.0
+    root = Root(chain, niche=niche, offspring=offspring)
     samples = (
-        (matrix, standing if convention == "procedure" else row_of(matrix, state))
-        for matrix in transitions(chain, draws, seed)
+        (matrix, root.first(matrix, convention)[None, :]) for matrix in transition_draws(chain, draws, seed)
     )
+    size = repeats_per_draw(repeats, chain, draws)
     result = one_root(chain, samples, l, lineages, method, convention, size, seed)
-    return replace(result, births=None if chain.births is None else int(chain.births[state]))
+    known = root.state is not None and chain.births is not None
+    return replace(result, births=int(chain.births[root.state]) if known else None)  # type: ignore[index]
 
 
 def niche_evolvability(
@@ -131,22 +120,23 @@ def niche_evolvability(
     """
     check(l, lineages, method, convention, repeats, draws)
     n = chain.n_niches
-    generations = states_counted(l, convention)
+    states_counted = generations(l, convention)
     size = repeats_per_draw(repeats, chain, draws)
     standing = sparse.eye_array(chain.states, format="csr")
     means, errors, saturated = [], [], False
-    for number, matrix in enumerate(transitions(chain, draws, seed)):
+    for number, matrix in enumerate(transition_draws(chain, draws, seed)):
         first: Matrix = standing if convention == "procedure" else matrix
         if method == "exact":
-            covered = expected_coverage(matrix, first, generations, [lineages, ENDLESS], counted=n)[:n]
+            covered = expected_coverage(matrix, first, states_counted, [lineages, ENDLESS], counted=n)[:n]
             saturated |= bool(np.median(covered[:, 0] / np.maximum(covered[:, 1], 1e-300)) > SATURATED)
             means.append(covered[:, 0])
             errors.append(np.zeros(n))
         else:
             rng = keyed(seed, Purpose.WALKS, number)
+            roots = (Root(chain, niche=niche).first(matrix, convention) for niche in range(n))
             sampled = [
-                sampled_coverage(matrix, row_of(first, i)[0], generations, lineages, size, rng, counted=n)
-                for i in range(n)
+                sampled_coverage(matrix, root, states_counted, lineages, size, rng, counted=n)
+                for root in roots
             ]
             means.append(np.mean(sampled, axis=1))
             errors.append(np.array([standard_error(walks) for walks in sampled]))
@@ -155,19 +145,3 @@ def niche_evolvability(
     return NicheEvolvability(
         value, error, low, high, births, l, lineages, method, convention, chain.estimator, saturated
     )
-
-
-def _distribution(offspring: ArrayLike | None, chain: NicheChain) -> Floats:
-    """D as a row (1, S)."""
-    given = np.asarray(offspring, np.float64)
-    if given.shape not in ((chain.n_niches,), (chain.states,)):
-        raise NichechainError(
-            f"offspring has shape {given.shape}, but must be ({chain.n_niches},), one share per niche"
-        )
-    if not np.isfinite(given).all() or (given < 0).any() or abs(given.sum() - 1.0) > 1e-8:
-        raise NichechainError(
-            f"offspring sums to {given.sum():.9g}, but must be shares that are not negative and sum to 1"
-        )
-    row = np.zeros((1, chain.states))
-    row[0, : given.size] = given
-    return row
