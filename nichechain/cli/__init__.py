@@ -12,6 +12,7 @@ COMMANDS = {
     "info": "what is in an archive, and what made it",
     "evolvability": "l-evolvability of niches, or of an elite",
     "plot": "heat maps of an archive and graphs of which niches lead to which",
+    "explore": "a page on which one clicks a niche and sees where its descendants go",
     "validate": "whether the chain is one, and whether its predictions come true",
 }
 

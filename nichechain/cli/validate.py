@@ -1,0 +1,182 @@
+"""``nichechain validate``: whether the chain of an archive is one, and whether it predicts."""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import tyro
+
+from nichechain.cli import console
+from nichechain.errors import NichechainError
+
+if TYPE_CHECKING:
+    from nichechain.validation import Validation, ValidationConfig
+
+# Seconds between progress lines where there is no terminal to redraw.
+_LINE_EVERY = 10.0
+
+
+@dataclass(frozen=True)
+class Validate:
+    """Test whether births are a Markov chain's, and check its predictions on lineages really run."""
+
+    path: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="PATH")]
+    """Archive folder, or the name of an archive that ships with nichechain."""
+    elites: int = 24
+    """Elites to run lineages from, spread over what the chain predicts."""
+    lineages: int = 20
+    """Lineages U from each elite."""
+    l: int = 5  # noqa: E741  # the paper's name
+    """Generations of a lineage."""
+    permutations: int = 499
+    """Permutations of each test."""
+    seed: int = 0
+    """Seed of the choice of elites, of their lineages, of permutations and of draws."""
+    workers: Annotated[int | None, console.option("INT", "one per processor")] = None
+    """Threads. They do not change the result."""
+    out: Annotated[Path | None, console.option("DIR", "NAME-validation")] = None
+    """Folder for validation.json, calibration.png and lineages.csv."""
+
+
+def run(arguments: Sequence[str]) -> int:
+    """Validate."""
+    command = console.parse(Validate, arguments)
+    from nichechain.archive import load
+    from nichechain.execution import Threads
+    from nichechain.validation import ValidationConfig, validate
+
+    config = ValidationConfig(
+        elites=command.elites,
+        lineages=command.lineages,
+        l=command.l,
+        permutations=command.permutations,
+        seed=command.seed,
+    )
+    archive = load(command.path)
+    out = command.out or Path(f"{archive.folder.name}-validation")
+    if out.exists() and not out.is_dir():
+        raise NichechainError(f"--out is {str(out)!r}, but that is a file, not a folder")
+    with Threads(command.workers) as threads, _progress(config.evaluations) as tell:
+        result = validate(archive, threads, config, on_done=tell)
+    # Made only now, so that bad input leaves nothing behind.
+    out.mkdir(parents=True, exist_ok=True)
+    (out / "validation.json").write_text(json.dumps(result.to_json(), indent=2) + "\n", encoding="utf-8")
+    result.direct.lineages.to_frame().to_csv(out / "lineages.csv", index=False)
+    _draw(result, out / "calibration.png")
+    _show(result, config)
+    console.console().print(f"wrote validation.json, calibration.png and lineages.csv to {out}")
+    return 0
+
+
+def _draw(result: Validation, out: Path) -> None:
+    """Calibration after one generation and after all, and the means over generations."""
+    from matplotlib.figure import Figure
+
+    from nichechain.plots.calibration import plot_calibration, plot_reached
+
+    generations = sorted({1, result.config.l})
+    figure = Figure(figsize=(5.0 * (len(generations) + 1), 5.0), layout="constrained")
+    *some, last = figure.subplots(1, len(generations) + 1)
+    for generation, ax in zip(generations, some, strict=True):
+        plot_calibration(result.direct, ax, generation=generation)
+    plot_reached(result.direct, last)
+    figure.savefig(out, dpi=150)
+
+
+def _show(result: Validation, config: ValidationConfig) -> None:
+    shown = console.console()
+    shown.print(f"[bold]Is it Markov?[/] {result.births} births, {config.permutations} permutations")
+    table = console.table("test", "of a chain's", "p", "niches", "births")
+    for test in result.tests:
+        table.add_row(
+            test.name,
+            f"{test.ratio:.3f}",
+            f"{test.p_value:.3f}",
+            f"{test.niches} of {test.all_niches}",
+            f"{test.births} of {test.all_births}",
+        )
+    shown.print(table)
+    shown.print(
+        "[dim]of a chain's: the statistic over its mean under permutations; niches and births: those "
+        "that\ncould be permuted, the others say nothing[/]"
+    )
+    direct = result.direct
+    shown.print(
+        f"\n[bold]Is it right?[/] {config.lineages} lineages of {config.l} generations, really run, "
+        f"from each of {len(direct.reached)} elites"
+    )
+    shown.print(f"[dim]estimator: {direct.estimator}; convention: definition[/]")
+    if direct.lineages.failed:
+        shown.print(f"{direct.lineages.failed} lineages ended with a failed evaluation")
+    for start, rows in direct.summary().groupby("start", sort=False):
+        table = console.table(
+            "l",
+            "real",
+            "chain",
+            "bias",
+            "Spearman",
+            "if right",
+            "slope",
+            "in 90 %",
+            title=f"From the {start}",
+        )
+        for row in rows.itertuples():
+            table.add_row(
+                str(row.generation),
+                f"{row.reached:.2f}",
+                f"{row.predicted:.2f}",
+                f"{row.bias:+.2f}±{row.bias_high - row.bias:.2f}",
+                f"{row.spearman:.2f}",
+                f"{row.spearman_low:.2f}, {row.spearman_high:.2f}",
+                f"{row.slope:.2f}",
+                f"{row.covered:.0%}",
+            )
+        shown.print(table)
+    shown.print(
+        "[dim]real, chain: niches reached, means over the elites; bias: with its 95 % interval; if right:\n"
+        "the Spearman that so few lineages would give a chain that is right; slope: of the real on\n"
+        "the chain's, above 1 where elites differ more than it says; in 90 %: elites within the\n"
+        "chain's 90 % interval[/]"
+    )
+
+
+@contextmanager
+def _progress(total: int) -> Iterator[Callable[[int], None]]:
+    """A bar on standard error; plain lines now and then where that is no terminal."""
+    from rich import progress
+    from rich.console import Console
+
+    shown = Console(stderr=True)
+    if not shown.is_terminal:
+        yield _lines(total)
+        return
+    columns = (
+        progress.BarColumn(bar_width=None),
+        progress.MofNCompleteColumn(),
+        progress.TimeRemainingColumn(compact=True),
+        progress.TextColumn("left"),
+    )
+    with progress.Progress(*columns, console=shown) as bar:
+        task = bar.add_task("", total=total)
+        yield lambda done: bar.update(task, advance=done)
+
+
+def _lines(total: int) -> Callable[[int], None]:
+    evaluated = 0
+    last = time.monotonic()
+
+    def tell(done: int) -> None:
+        nonlocal evaluated, last
+        evaluated += done
+        if time.monotonic() - last >= _LINE_EVERY:
+            last = time.monotonic()
+            print(f"{evaluated} of {total} evaluated", file=sys.stderr, flush=True)
+
+    return tell

@@ -1,0 +1,247 @@
+"""Chapman-Kolmogorov: whether two generations are what two transitions make of one.
+
+On lineages without selection, k generations must distribute as T^k. On births of a search the
+middle generation was selected, so T² is not what even a perfect chain shows: given the niches j
+of the parents, those of the children must distribute as Σ_j w_ij T_jk, with w the share of
+middle niches that were observed.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from nichechain.births import NONE
+from nichechain.errors import NichechainError
+from nichechain.randomness import Purpose, keyed
+from nichechain.validation.lineages import Triples
+from nichechain.validation.markov import PERMUTATIONS, MarkovTest, check_permutations, p_value
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+# Beyond the tests of nichechain.validation.markov, which draw from the first few.
+_BIRTHS = 10
+_LINEAGES = 11
+
+
+def births_test(triples: Triples, *, permutations: int = PERMUTATIONS, seed: int = 0) -> MarkovTest:
+    """Children against Σ_j w_ij T_jk for each grandparent state i, on births of a search.
+
+    The statistic is the squared distance of counts from expectation, over (i, k), divided by the
+    sums of row and column as in correspondence analysis; and that over what it would be were the
+    children of one middle niche drawn from one urn. T has the observed shares. Grandparents are
+    permuted among the parents of one niche. Other than the lineage test it adds up what a
+    grandparent's niche does over all middle niches, so that nearly all births contribute.
+
+    Parameters
+    ----------
+    triples : Triples
+    permutations : int
+        At least 1.
+    seed : int
+
+    Raises
+    ------
+    NichechainError
+        If ``permutations`` is below 1.
+    """
+    check_permutations(permutations)
+    known = triples.with_grandparent
+    name = "Chapman-Kolmogorov, w T"
+    everything = int(np.unique(known.niche).size), len(known)
+    several = np.bincount(np.unique(np.stack([known.niche, known.grandparent]), axis=1)[0], minlength=1) > 1
+    used = known.of(several[known.niche])
+    facts = (int(np.unique(used.niche).size), len(used), *everything)
+    if not len(used):
+        return MarkovTest(name, 0.0, 0.0, 1.0, permutations, *facts)
+    order = np.argsort(used.niche, kind="stable")
+    place = np.empty(order.size, np.int64)
+    place[order] = np.arange(order.size)
+    niche, grandparent = used.niche[order], used.grandparent[order]
+    sums = _Sums(niche, place[used.elite], used.child)
+    observed = sums.ratio(grandparent)
+    rng = keyed(seed, Purpose.PERMUTATION, _BIRTHS)
+    values = np.array(
+        [sums.ratio(grandparent[np.lexsort((rng.random(niche.size), niche))]) for _ in range(permutations)]
+    )
+    return MarkovTest(name, observed, float(values.mean()), p_value(observed, values), permutations, *facts)
+
+
+def lineages_test(states: Ints, *, permutations: int = PERMUTATIONS, seed: int = 0) -> list[MarkovTest]:
+    """Generations k = 2, 3, ... of lineages without selection, against T^k.
+
+    The statistic is the squared distance, over all starts, of the states k generations on from
+    the k-th power of the observed shares of single generations, scaled as in
+    :func:`births_test`. What follows is permuted among the
+    lineages that stand in one state in one generation, which leaves single generations as they
+    are and makes the test exact.
+
+    Parameters
+    ----------
+    states : (N, l + 1) int64 array
+        Lineages from their roots on, ``NONE`` after a failed birth.
+    permutations : int
+        At least 1.
+    seed : int
+
+    Returns
+    -------
+    list of MarkovTest
+        One for each k from 2 to l. ``niches`` are the states in which lineages of different
+        history meet, ``births`` the visits there.
+
+    Raises
+    ------
+    NichechainError
+        If there are no two generations, or ``permutations`` is below 1.
+    """
+    check_permutations(permutations)
+    if states.ndim != 2 or states.shape[1] < 3:
+        raise NichechainError(f"lineages have shape {states.shape}, but must be (N, l + 1) with l at least 2")
+    # A failed birth is a state like any other, which is never left.
+    names, numbered = np.unique(states, return_inverse=True)
+    walks = numbered.reshape(states.shape).astype(np.int64)
+    n, generations = names.size, states.shape[1] - 1
+    step = sparse.csr_array(_pairs(walks, 1, n), dtype=np.float64)
+    leaving = np.asarray(step.sum(axis=1)).ravel()
+    # A state seen in last generations only is left by no lineage that counts.
+    single = sparse.diags_array(1.0 / np.maximum(leaving, 1.0)) @ step
+    tables = []
+    power = single
+    for k in range(2, generations + 1):
+        power = power @ single
+        tables.append(_Distant(walks, k, power))
+    observed = [table.distance(walks) for table in tables]
+    rng = keyed(seed, Purpose.PERMUTATION, _LINEAGES)
+    values = np.empty((permutations, len(tables)))
+    for number in range(permutations):
+        recombined = _recombined(walks, rng)
+        values[number] = [table.distance(recombined) for table in tables]
+    niches, births = _meetings(walks, names)
+    alive = states != NONE
+    facts = (niches, births, int(np.unique(states[:, 1:-1][alive[:, 1:-1]]).size), int(alive[:, 2:].sum()))
+    return [
+        MarkovTest(
+            f"Chapman-Kolmogorov, T^{k}",
+            observed[k - 2],
+            float(values[:, k - 2].mean()),
+            p_value(observed[k - 2], values[:, k - 2]),
+            permutations,
+            *facts,
+        )
+        for k in range(2, generations + 1)
+    ]
+
+
+class _Sums:
+    """Distance of grandparent × child from Σ_j w_ij T_jk, over its expectation.
+
+    Parameters
+    ----------
+    niche : (E,) int64 array
+        State j of each parent.
+    parent : (N,) int64 array
+        Parent of each child.
+    child : (N,) int64 array
+    """
+
+    def __init__(self, niche: Ints, parent: Ints, child: Ints) -> None:
+        self._parent, self._child = parent, child
+        self._middle, self._of = np.unique(niche, return_inverse=True)
+        self._size = np.bincount(parent, minlength=niche.size).astype(np.float64)
+        columns, column, landed = np.unique(child, return_inverse=True, return_counts=True)
+        self._columns, self._column, self._landed = columns.size, column, landed
+        shape = (self._middle.size, columns.size)
+        counts = sparse.coo_array((np.ones(child.size), (self._of[parent], column)), shape=shape).tocsr()
+        self._births = np.asarray(counts.sum(axis=1)).ravel()
+        self._shares = (sparse.diags_array(1.0 / self._births) @ counts).tocsr()
+        self._spread = self._shares - self._shares.multiply(self._shares)
+
+    def ratio(self, grandparent: Ints) -> float:
+        """The statistic for grandparent states (E,)."""
+        rows = int(grandparent.max()) + 1
+        width = self._columns
+        seen = np.bincount(grandparent[self._parent] * width + self._column, minlength=rows * width)
+        middle = self._middle.size
+        weights = np.bincount(grandparent * middle + self._of, self._size, minlength=rows * middle)
+        weights = weights.reshape(rows, middle)
+        kept = np.flatnonzero(weights.any(axis=1))
+        weights = weights[kept]
+        expected = (sparse.csr_array(weights) @ self._shares).toarray()
+        # Drawn without replacement: an urn that one grandparent's children empty leaves no chance.
+        left = weights * (self._births - weights) / np.maximum(self._births - 1.0, 1.0)
+        variance = (sparse.csr_array(left) @ self._spread).toarray()
+        off = seen.reshape(rows, width)[kept] - expected
+        # Divided by row and column sums, not by the expectation given the middle niches: a rare
+        # state that one parent keeps breeding into would weigh most where it contradicts T least.
+        scale = weights.sum(axis=1)[:, None] * self._landed
+        chance = float((variance / scale).sum())
+        return float((off**2 / scale).sum()) / chance if chance > 1e-12 else 0.0
+
+
+class _Distant:
+    """Pairs of states k generations apart against a power of T.
+
+    Parameters
+    ----------
+    walks : (N, l + 1) int64 array
+    apart : int
+        k.
+    power : (n, n) sparse matrix
+    """
+
+    def __init__(self, walks: Ints, apart: int, power: sparse.csr_array) -> None:
+        n = power.shape[0]
+        self._apart = apart
+        starts = np.bincount(walks[:, :-apart].ravel(), minlength=n)
+        ends = np.bincount(walks[:, apart:].ravel(), minlength=n)
+        scale = 1.0 / np.maximum(np.outer(starts, ends), 1)
+        expected = (sparse.diags_array(starts.astype(np.float64)) @ power).toarray()
+        self._scale, self._expected = scale.ravel(), expected.ravel()
+        self._empty = float((self._scale * self._expected**2).sum())
+        self._states = n
+
+    def distance(self, walks: Ints) -> float:
+        """Squared distance of the counts from expectation, cells divided by row and column sums."""
+        start, end = walks[:, : -self._apart].ravel(), walks[:, self._apart :].ravel()
+        pair, count = np.unique(start * self._states + end, return_counts=True)
+        full = self._scale[pair] * count * (count - 2.0 * self._expected[pair])
+        return self._empty + float(full.sum())
+
+
+def _pairs(walks: Ints, apart: int, n: int) -> sparse.coo_array:
+    """How often each state follows each, (n, n)."""
+    start, end = walks[:, :-apart].ravel(), walks[:, apart:].ravel()
+    return sparse.coo_array((np.ones(start.size), (start, end)), shape=(n, n))
+
+
+def _recombined(walks: Ints, rng: np.random.Generator) -> Ints:
+    """Lineages that exchange what follows wherever they stand in one state in one generation."""
+    made = walks.copy()
+    follows = np.arange(len(walks))
+    for generation in range(1, walks.shape[1] - 1):
+        here = walks[:, generation]
+        # Row m of the sorted states gets another row's continuation from the same state.
+        exchanged = np.empty_like(follows)
+        exchanged[np.argsort(here, kind="stable")] = np.lexsort((rng.random(here.size), here))
+        follows = exchanged[follows]
+        made[:, generation + 1] = walks[follows, generation + 1]
+    return made
+
+
+def _meetings(walks: Ints, names: Ints) -> tuple[int, int]:
+    """States where lineages meet that came from different states and go on differently, and visits."""
+    met: set[int] = set()
+    visits = 0
+    for generation in range(1, walks.shape[1] - 1):
+        here = walks[:, generation]
+        came = np.unique(walks[:, [generation, generation - 1]], axis=0)[:, 0]
+        goes = np.unique(walks[:, [generation, generation + 1]], axis=0)[:, 0]
+        size = names.size
+        several = (np.bincount(came, minlength=size) > 1) & (np.bincount(goes, minlength=size) > 1)
+        several &= names != NONE
+        met.update(np.flatnonzero(several).tolist())
+        visits += int(np.count_nonzero(several[here]))
+    return len(met), visits

@@ -1,0 +1,240 @@
+"""The direct check: what descendants really reach beside what the chain predicts.
+
+From some elites, lineages without selection are run with real evaluations, and the number of
+niches they reach is compared with what the chain says of a lineage that begins in the elite's
+niche, and of one that begins with the elite's own offspring. ``definition`` is the convention:
+generation 1 is drawn from the niche's row of T, the root does not count, nor does the outside.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+from scipy import stats
+
+from nichechain.births import NONE
+from nichechain.chain.model import Matrix, NicheChain
+from nichechain.coverage import expected_coverage, rarefied_coverage
+from nichechain.errors import NichechainError
+from nichechain.niches import GridNiches
+from nichechain.randomness import Purpose, keyed
+from nichechain.validation.rollouts import Lineages, niches_reached
+from nichechain.validation.simulate import RowSampler, simulate_lineages
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+DRAWS = 50
+# Simulations of the whole check on each draw of T.
+_REPLICAS = 8
+# Quantiles of a 90 % interval.
+_INTERVAL = (0.05, 0.95)
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """Niches that lineages reach, as the chain has it.
+
+    Parameters
+    ----------
+    start : str
+        ``niche`` or ``genotype``: whose offspring are generation 1.
+    value : (R, l) float64 array
+        Expected number up to each generation, the mean over draws of T.
+    simulated : (R, l, K) int64 array
+        Numbers of simulated checks: what births leave unknown of T, and chance, are both in
+        their spread.
+    """
+
+    start: str
+    value: Floats
+    simulated: Ints
+
+    @property
+    def interval(self) -> tuple[Floats, Floats]:
+        """90 % interval of the number that this many lineages reach, (R, l) each."""
+        low, high = np.quantile(self.simulated, _INTERVAL, axis=2)
+        return low, high
+
+
+@dataclass(frozen=True)
+class DirectCheck:
+    """What lineages reached beside what was predicted.
+
+    Parameters
+    ----------
+    lineages : Lineages
+    reached : (R, l) int64 array
+        Niches really reached.
+    births : (R,) int64 array
+        Births behind each root's row of T.
+    predictions : tuple of Prediction
+        From niche and from genotype starts.
+    estimator : str
+    """
+
+    lineages: Lineages
+    reached: Ints
+    births: Ints
+    predictions: tuple[Prediction, ...]
+    estimator: str
+
+    def summary(self) -> pd.DataFrame:
+        """One row per start and generation.
+
+        Returns
+        -------
+        DataFrame
+            ``start``, ``generation``; ``reached`` and ``predicted``, means over the elites;
+            ``spearman`` of the two, and ``spearman_expected`` with ``_low`` and ``_high``, which
+            it would be if the chain were right, so few lineages being run; ``bias``, predicted
+            minus reached, with a 95 % t-interval over elites; ``slope`` of reached on predicted,
+            above 1 where elites differ more than the chain says; ``covered``, the share of elites
+            whose number lies in the chain's 90 % interval.
+        """
+        rows = []
+        for prediction in self.predictions:
+            low, high = prediction.interval
+            for k in range(self.reached.shape[1]):
+                real, value = self.reached[:, k], prediction.value[:, k]
+                ideal = _spearmans(prediction.simulated[:, k], value)
+                bias = value - real
+                width = stats.t.ppf(0.975, bias.size - 1) * bias.std(ddof=1) / np.sqrt(bias.size)
+                rows.append(
+                    {
+                        "start": prediction.start,
+                        "generation": k + 1,
+                        "reached": real.mean(),
+                        "predicted": value.mean(),
+                        "spearman": float(_spearmans(real[:, None], value)[0]),
+                        "spearman_expected": np.median(ideal),
+                        "spearman_low": np.quantile(ideal, _INTERVAL[0]),
+                        "spearman_high": np.quantile(ideal, _INTERVAL[1]),
+                        "bias": bias.mean(),
+                        "bias_low": bias.mean() - width,
+                        "bias_high": bias.mean() + width,
+                        "slope": _slope(real, value),
+                        "covered": np.mean((real >= low[:, k]) & (real <= high[:, k])),
+                    }
+                )
+        return pd.DataFrame(rows)
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row per start, elite and generation: niches reached, predicted, 90 % interval."""
+        roots, generations = self.reached.shape
+        parts = []
+        for prediction in self.predictions:
+            low, high = prediction.interval
+            parts.append(
+                pd.DataFrame(
+                    {
+                        "start": prediction.start,
+                        "root": np.repeat(self.lineages.roots, generations),
+                        "births": np.repeat(self.births, generations),
+                        "generation": np.tile(np.arange(1, generations + 1), roots),
+                        "reached": self.reached.ravel(),
+                        "predicted": prediction.value.ravel(),
+                        "low": low.ravel(),
+                        "high": high.ravel(),
+                    }
+                )
+            )
+        return pd.concat(parts, ignore_index=True)
+
+
+def compare(
+    chain: NicheChain, lineages: Lineages, niches: GridNiches, *, draws: int = DRAWS, seed: int = 0
+) -> DirectCheck:
+    """Predict what the lineages reached, without looking at them.
+
+    Values are those of :func:`nichechain.l_evolvability` and
+    :func:`nichechain.genotype_evolvability` for each root and each number of generations.
+
+    Parameters
+    ----------
+    chain : NicheChain
+    lineages : Lineages
+    niches : GridNiches
+    draws : int
+        Draws of T, where the chain has a posterior.
+    seed : int
+
+    Returns
+    -------
+    DirectCheck
+
+    Raises
+    ------
+    NichechainError
+        If ``draws`` is below 1.
+    """
+    if draws < 1:
+        raise NichechainError(f"draws is {draws}, but at least 1 is needed")
+    roots, size, generations = lineages.states.shape
+    n = chain.n_niches
+    counts = np.stack([np.bincount(row[row != NONE], minlength=chain.states) for row in lineages.offspring])
+    values: list[Floats] = []
+    simulated: list[Ints] = []
+    for number, matrix in enumerate(_transitions(chain, draws, seed)):
+        rows = matrix[lineages.roots] if isinstance(matrix, np.ndarray) else matrix[lineages.roots].toarray()
+        rng = keyed(seed, Purpose.FIRST_GENERATION, number)
+        strength = 1.0 if chain.posterior is None else chain.posterior.strength
+        weight = rng.standard_gamma(counts + strength * rows)
+        first = np.concatenate([rows, weight / weight.sum(axis=1, keepdims=True)])
+        values.append(
+            np.stack(
+                [expected_coverage(matrix, first, k + 1, size, counted=n) for k in range(generations)], axis=1
+            )
+        )
+        rng = keyed(seed, Purpose.PREDICTION, number)
+        begin = RowSampler(first)(np.tile(np.repeat(np.arange(2 * roots), size), _REPLICAS), rng)
+        walks = simulate_lineages(matrix, begin.reshape(-1, size), generations, rng)
+        simulated.append(niches_reached(walks, n).reshape(_REPLICAS, 2 * roots, generations))
+    value = np.mean(values, axis=0)
+    spread = np.moveaxis(np.concatenate(simulated), 0, 2)
+    genotype = value[roots:]
+    if size <= counts.sum(axis=1).min():
+        # No distribution has to be guessed: these are children, and there are enough of them.
+        genotype[:, 0] = [rarefied_coverage(row, size, counted=n) for row in counts]
+    births = np.zeros(chain.states, np.int64) if chain.births is None else chain.births
+    return DirectCheck(
+        lineages,
+        lineages.reached(len(niches)),
+        births[lineages.roots],
+        (
+            Prediction("niche", value[:roots], spread[:roots]),
+            Prediction("genotype", genotype, spread[roots:]),
+        ),
+        chain.estimator,
+    )
+
+
+def _transitions(chain: NicheChain, draws: int, seed: int) -> Iterator[Matrix]:
+    """T in every draw: where it is given, draws differ by chance alone."""
+    for number in range(draws):
+        if chain.posterior is None:
+            yield chain.T
+        else:
+            yield chain.posterior.draw(keyed(seed, Purpose.POSTERIOR, number))
+
+
+def _spearmans(real: NDArray[np.int64], value: Floats) -> Floats:
+    """Rank correlation of each column of (R, K) with (R,); NaN where either is constant."""
+    x = stats.rankdata(value)
+    y = stats.rankdata(real, axis=0)
+    x = x - x.mean()
+    y = y - y.mean(axis=0)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        correlation: Floats = (x @ y) / np.sqrt((x @ x) * (y * y).sum(axis=0))
+    return correlation
+
+
+def _slope(real: Ints, value: Floats) -> float:
+    """Least-squares slope of what was reached on what was predicted, NaN where that is constant."""
+    off = value - value.mean()
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return float(np.float64(off @ real) / (off @ off))

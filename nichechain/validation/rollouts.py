@@ -1,0 +1,217 @@
+"""Lineages without selection, really mutated and evaluated."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from nichechain.archive import Archive
+from nichechain.births import NONE
+from nichechain.chain.model import NicheChain
+from nichechain.coverage import check_lengths
+from nichechain.errors import NichechainError
+from nichechain.evolvability import niche_evolvability
+from nichechain.execution import Executor
+from nichechain.randomness import Purpose, keyed
+
+Float32s = NDArray[np.float32]
+Ints = NDArray[np.int64]
+OnDone = Callable[[int], None]
+
+OFFSPRING = 30
+MIN_BIRTHS = 20
+
+
+@dataclass(frozen=True)
+class Lineages:
+    """Lineages without selection, really evaluated.
+
+    Parameters
+    ----------
+    roots : (R,) int64 array
+        States of the elites they begin with.
+    states : (R, U, l) int64 array
+        States of generations 1 to l; ``NONE`` from a failed birth on.
+    offspring : (R, m) int64 array
+        States of further children of each elite, ``NONE`` where they failed.
+    """
+
+    roots: Ints
+    states: Ints
+    offspring: Ints
+
+    @property
+    def failed(self) -> int:
+        """Lineages that ended with a birth whose evaluation failed."""
+        return int(np.count_nonzero((self.states == NONE).any(axis=2)))
+
+    @property
+    def walks(self) -> Ints:
+        """Every lineage from its root on, (R·U, l + 1)."""
+        roots = np.broadcast_to(self.roots[:, None, None], (*self.states.shape[:2], 1))
+        return np.concatenate([roots, self.states], axis=2).reshape(-1, self.states.shape[2] + 1)
+
+    def reached(self, niches: int) -> Ints:
+        """Distinct niches among the first ``niches`` states up to each generation, (R, l)."""
+        return niches_reached(self.states, niches)
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row per birth: root, lineage, generation, state (null where it failed)."""
+        index = np.indices(self.states.shape).reshape(3, -1)
+        state = pd.array(self.states.ravel(), "Int64")
+        state[self.states.ravel() == NONE] = pd.NA
+        return pd.DataFrame(
+            {"root": self.roots[index[0]], "lineage": index[1], "generation": index[2] + 1, "state": state}
+        )
+
+
+def sample_roots(
+    chain: NicheChain,
+    filled: Ints,
+    size: int,
+    *,
+    l: int,  # noqa: E741
+    lineages: int,
+    min_births: int = MIN_BIRTHS,
+    seed: int = 0,
+) -> Ints:
+    """Niches to check: one drawn from each of ``size`` equal groups by predicted l-evolvability.
+
+    Parameters
+    ----------
+    chain : NicheChain
+        Estimated from births.
+    filled : (K,) int64 array
+        Niches with an elite.
+    size : int
+        How many, at least 3; all that qualify where those are fewer.
+    l, lineages, seed
+        As in :func:`nichechain.niche_evolvability`.
+    min_births : int
+        Niches with fewer births behind their row of T do not qualify, as they are not ranked.
+
+    Returns
+    -------
+    (R,) int64 array, sorted
+
+    Raises
+    ------
+    NichechainError
+        If fewer than 3 are asked for or qualify.
+    """
+    if size < 3:
+        raise NichechainError(f"elites are {size}, but a rank correlation needs at least 3")
+    assert chain.births is not None
+    niches = filled[(filled < chain.n_niches) & (chain.births[filled] >= min_births)]
+    if niches.size < 3:
+        raise NichechainError(
+            f"{niches.size} niches have {min_births} births behind their row of T, but at least 3 are needed"
+        )
+    scores = niche_evolvability(chain, l=l, lineages=lineages, draws=10, seed=seed).value
+    ranked = niches[np.argsort(scores[niches], kind="stable")]
+    rng = keyed(seed, Purpose.CHECKED)
+    groups = np.array_split(ranked, min(size, ranked.size))
+    return np.sort(np.array([rng.choice(group) for group in groups]))
+
+
+def run_lineages(
+    archive: Archive,
+    roots: Ints,
+    executor: Executor,
+    *,
+    l: int,  # noqa: E741
+    lineages: int,
+    offspring: int = OFFSPRING,
+    seed: int = 0,
+    on_done: OnDone | None = None,
+) -> Lineages:
+    """Mutate and evaluate: U lineages of l generations from each elite, and m more children.
+
+    A birth depends on its elite, its lineage's number, its generation and the seed alone: not on
+    how many other elites or lineages there are, nor on the executor.
+
+    Parameters
+    ----------
+    archive : Archive
+        Where elites, domain, mutation and niches come from.
+    roots : (R,) int64 array
+        Niches with an elite.
+    executor : Executor
+    l, lineages, offspring : int
+        At least 1.
+    seed : int
+    on_done : callable, optional
+        Told how many more have been evaluated; R·(l·U + m) in all, but for failures.
+
+    Returns
+    -------
+    Lineages
+
+    Raises
+    ------
+    NichechainError
+        If a number is out of range or a niche is empty.
+    """
+    check_lengths(l, lineages)
+    if offspring < 1:
+        raise NichechainError(f"offspring is {offspring}, but at least 1 is needed")
+    elites = [archive.elite(int(root)).genotype for root in roots]
+    mutate, niches = archive.mutate, archive.niches
+
+    def born(children: list[Float32s]) -> Ints:
+        evaluation = executor.evaluate(archive.domain, np.stack(children), on_done)
+        state = np.full(len(children), NONE, np.int64)
+        fine = ~evaluation.failed
+        state[fine] = niches.of(evaluation.behavior[fine])
+        return state
+
+    states = np.full((len(elites), lineages, l), NONE, np.int64)
+    alive = [(r, u, elite) for r, elite in enumerate(elites) for u in range(lineages)]
+    for generation in range(l):
+        if not alive:
+            break
+        children = [
+            mutate(parent, keyed(seed, Purpose.LINEAGE, _birth(int(roots[r]), u, generation)))
+            for r, u, parent in alive
+        ]
+        landed = born(children)
+        for (r, u, _), state in zip(alive, landed.tolist(), strict=True):
+            states[r, u, generation] = state
+        alive = [
+            (r, u, child)
+            for (r, u, _), child, state in zip(alive, children, landed.tolist(), strict=True)
+            if state != NONE
+        ]
+    if niches.outside == "absorb":
+        states = _absorbed(states, len(niches))
+    further = [mutate(elite, keyed(seed, Purpose.OFFSPRING, i)) for elite in elites for i in range(offspring)]
+    return Lineages(np.asarray(roots, np.int64), states, born(further).reshape(len(elites), offspring))
+
+
+def niches_reached(states: Ints, niches: int) -> Ints:
+    """Distinct niches up to each generation, (R, l), of lineages (R, U, l)."""
+    roots, lineages, generations = states.shape
+    seen = np.zeros((roots, niches + 1), bool)
+    rows = np.repeat(np.arange(roots), lineages)
+    reached = np.empty((roots, generations), np.int64)
+    for k in range(generations):
+        here = states[:, :, k].ravel()
+        # The last column stands for all that does not count.
+        seen[rows, np.where((here >= 0) & (here < niches), here, niches)] = True
+        reached[:, k] = np.count_nonzero(seen[:, :niches], axis=1)
+    return reached
+
+
+def _absorbed(states: Ints, outside: int) -> Ints:
+    """Lineages that stay outside once they are."""
+    gone = np.logical_or.accumulate(states == outside, axis=2)
+    return np.where(gone, outside, states)
+
+
+def _birth(root: int, lineage: int, generation: int) -> int:
+    """One number for a birth, whatever the numbers of elites, lineages and generations."""
+    return (root << 40) | (lineage << 16) | generation

@@ -1,0 +1,168 @@
+"""Births and lineages of a chain that is known: what a test must not mistake for a violation."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike, NDArray
+from scipy import sparse
+
+from nichechain.births import NONE
+from nichechain.chain.model import Matrix, NicheChain
+from nichechain.errors import NichechainError
+
+Ints = NDArray[np.int64]
+
+
+def simulate_births(
+    chain: NicheChain,
+    births: int,
+    rng: np.random.Generator,
+    *,
+    start: ArrayLike = 0,
+    batch: int = 64,
+    memory: float = 0.0,
+) -> pd.DataFrame:
+    """Births of a MAP-Elites run in which a child's niche depends on its parent's alone.
+
+    Parents are drawn uniformly from the occupied states; the elite of a state is a uniform sample
+    of the births there, as with random replacement.
+
+    Parameters
+    ----------
+    chain : NicheChain
+        The law of birth.
+    births : int
+        Births in total, the initial ones among them.
+    rng : numpy.random.Generator
+    start : int or (k,) ints
+        States of the initial births.
+    batch : int
+        Children of a step, at least 1.
+    memory : float
+        Probability that a child falls back to the state of its grandparent, if it has one: above
+        0 the births are no chain's.
+
+    Returns
+    -------
+    DataFrame
+        The columns of :mod:`nichechain.births` that lineages are joined by.
+
+    Raises
+    ------
+    NichechainError
+        If a number is out of range.
+    """
+    first = np.atleast_1d(np.asarray(start, np.int64))
+    if not 0 <= first.min(initial=0) <= first.max(initial=0) < chain.states or not first.size:
+        raise NichechainError(f"start is {first.tolist()}, but must be states from 0 to {chain.states - 1}")
+    if births < first.size or batch < 1:
+        raise NichechainError(
+            f"births are {births} in batches of {batch}, but must be at least {first.size} and 1"
+        )
+    if not 0.0 <= memory <= 1.0:
+        raise NichechainError(f"memory is {memory}, but must be a probability")
+    draw = RowSampler(chain.T)
+    columns = {
+        name: np.full(births, NONE, np.int64) for name in ("parent_uid", "parent_niche", "child_niche")
+    }
+    parent, parent_niche, niche = columns.values()
+    depth, step = np.zeros(births, np.int64), np.zeros(births, np.int64)
+    elite = np.full(chain.states, NONE, np.int64)
+    largest = np.full(chain.states, -np.inf)
+    done, number = 0, 0
+    while done < births:
+        here = slice(done, min(births, done + (batch if number else first.size)))
+        size = here.stop - here.start
+        if number:
+            occupied = np.flatnonzero(elite != NONE)
+            parent_niche[here] = occupied[rng.integers(occupied.size, size=size)]
+            parent[here] = elite[parent_niche[here]]
+            depth[here] = depth[parent[here]] + 1
+            niche[here] = draw(parent_niche[here], rng)
+            before = parent_niche[parent[here]]
+            back = (rng.random(size) < memory) & (before != NONE)
+            niche[here] = np.where(back, before, niche[here])
+        else:
+            niche[here] = first
+        step[here] = number
+        key = rng.random(size)
+        # The last of several writes to one place stays, and that is the largest key.
+        order = np.argsort(key)
+        best = np.full(chain.states, NONE, np.int64)
+        best[niche[here][order]] = order
+        landed = np.flatnonzero(best != NONE)
+        won = landed[key[best[landed]] > largest[landed]]
+        elite[won] = done + best[won]
+        largest[won] = key[best[won]]
+        done, number = here.stop, number + 1
+    return _frame(depth=depth, step=step, **columns)
+
+
+def simulate_lineages(matrix: Matrix, first: ArrayLike, generations: int, rng: np.random.Generator) -> Ints:
+    """Lineages without selection: each birth is the one parent of the next.
+
+    Parameters
+    ----------
+    matrix : (S, S) row-stochastic array or sparse matrix
+    first : (...) ints
+        States of generation 1.
+    generations : int
+        l, at least 1.
+    rng : numpy.random.Generator
+
+    Returns
+    -------
+    (..., generations) int64 array
+        States of generations 1 to l.
+
+    Raises
+    ------
+    NichechainError
+        If ``generations`` is below 1.
+    """
+    if generations < 1:
+        raise NichechainError(f"l is {generations}, but a lineage has at least 1 generation")
+    draw = RowSampler(matrix)
+    here = np.asarray(first, np.int64)
+    states = [here]
+    for _ in range(generations - 1):
+        here = draw(here.ravel(), rng).reshape(here.shape)
+        states.append(here)
+    return np.stack(states, axis=-1)
+
+
+class RowSampler:
+    """Draws states from the rows of a matrix.
+
+    Parameters
+    ----------
+    matrix : (m, S) row-stochastic array or sparse matrix
+    """
+
+    def __init__(self, matrix: Matrix) -> None:
+        rows = sparse.csr_array(matrix, copy=True)
+        rows.eliminate_zeros()
+        sizes = np.diff(rows.indptr)
+        of = np.repeat(np.arange(rows.shape[0]), sizes)
+        total = np.concatenate([[0.0], np.cumsum(rows.data)])
+        within = total[1:] - total[rows.indptr[:-1]][of]
+        # Row i fills the interval from i to i + 1, so that one search serves all rows.
+        self._upper = of + np.minimum(within / within[rows.indptr[1:] - 1][of], 1.0)
+        self._columns = rows.indices.astype(np.int64)
+        self._last = rows.indptr[1:] - 1
+
+    def __call__(self, rows: Ints, rng: np.random.Generator) -> Ints:
+        """One state for each of the rows (N,)."""
+        found = np.searchsorted(self._upper, rows + rng.random(rows.size), side="right")
+        # The sum can round up to the next row.
+        drawn: Ints = self._columns[np.minimum(found, self._last[rows])]
+        return drawn
+
+
+def _frame(**columns: Ints) -> pd.DataFrame:
+    births = len(columns["depth"])
+    frame = pd.DataFrame({"run": np.zeros(births, np.int64), "uid": np.arange(births), **columns})
+    nullable = ["parent_uid", "parent_niche", "child_niche"]
+    frame[nullable] = frame[nullable].astype("Int64").mask(frame[nullable] == NONE)
+    return frame
