@@ -12,8 +12,8 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from nichechain import domains, store, variation
-from nichechain.births import NONE
 from nichechain.chain import NicheChain, TransitionCounts, estimate
+from nichechain.chain.filters import counts_of
 from nichechain.config import BuildConfig
 from nichechain.domains.base import Domain
 from nichechain.errors import ArchiveError, NichechainError
@@ -76,6 +76,8 @@ class Archive:
         self.elites: Elites = store.read_state(folder, self.meta).elites
 
     def __repr__(self) -> str:
+        if self.meta.imported:
+            return f"Archive({str(self.folder)!r}: {self.meta.births} imported births)"
         return (
             f"Archive({str(self.folder)!r}: {self.filled} of {len(self.niches)} niches filled "
             f"by {self.meta.births} births)"
@@ -88,7 +90,17 @@ class Archive:
 
     @cached_property
     def domain(self) -> Domain:
-        """The domain that the archive was built on."""
+        """The domain that the archive was built on.
+
+        Raises
+        ------
+        ArchiveError
+            If its births were imported.
+        """
+        if self.meta.imported:
+            raise ArchiveError(
+                f"{self.folder} was imported, so nothing can be evaluated: its domain is not known"
+            )
         domain = self._domain or domains.make(self.config.domain, seed=self.config.domain_seed)
         length = self.elites.genotype.shape[1]
         if domain.genotype_length != length:
@@ -100,7 +112,17 @@ class Archive:
 
     @cached_property
     def mutate(self) -> variation.AdditiveMutation:
-        """The mutation operator that the archive was built with."""
+        """The mutation operator that the archive was built with.
+
+        Raises
+        ------
+        ArchiveError
+            If its births were imported.
+        """
+        if self.meta.imported:
+            raise ArchiveError(
+                f"{self.folder} was imported, so nothing can be mutated: its operator is not known"
+            )
         return variation.make(self.config.mutation, self.config.scale)
 
     def elite(self, niche: Niche) -> Elite:
@@ -111,6 +133,8 @@ class Archive:
         NichechainError
             If there is no such niche, or nobody was ever born in it.
         """
+        if self.meta.imported:
+            raise ArchiveError(f"{self.folder} was imported, so it has births but no elites")
         state = self.niches.flat(niche)
         row = np.searchsorted(self.elites.niche, state)
         if row == len(self.elites) or self.elites.niche[row] != state:
@@ -141,11 +165,14 @@ class Archive:
     @cached_property
     def counts(self) -> TransitionCounts:
         """Births from niche to niche."""
-        table = store.read_births(self.folder, self.meta)
-        parent, child, elite = (
-            table[name].fill_null(NONE).to_numpy() for name in ("parent_niche", "child_niche", "parent_uid")
-        )
-        return TransitionCounts.from_births(parent, child, self.niches, elite=elite)
+        return self.counts_of()
+
+    def counts_of(
+        self, *, run: int | None = None, steps: tuple[int, int] | None = None, accepted: bool = False
+    ) -> TransitionCounts:
+        """Some of the births from niche to niche, see :func:`nichechain.chain.filters.counts_of`."""
+        births = store.read_births(self.folder, self.meta)
+        return counts_of(births, self.niches, run=run, steps=steps, accepted=accepted)
 
     def chain(self, estimator: str = "empirical-bayes", **options: Any) -> NicheChain:
         """The Markov chain over niches, estimated from all births.

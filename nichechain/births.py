@@ -5,7 +5,7 @@ Columns
 run : int32
     Number of the run within an archive.
 uid : int64
-    Number of the birth within its run, from 0.
+    Number of the birth within its run, from 0; where runs were merged they are numbered on.
 parent_uid : int64, null for the initial births
 depth : int32
     Generations since an initial birth, which has depth 0.

@@ -81,6 +81,8 @@ def build(
         outside = failed = 0
         if store.is_archive(folder):
             meta = store.read_meta(folder)
+            if meta.origin is not None:
+                raise ArchiveError(f"{folder} was {meta.origin['kind']}, so no build can go on with it")
             _check_continues(meta.config, config, meta.births, folder)
             state = store.read_state(folder, meta)
             rows = store.read_births(folder, meta)

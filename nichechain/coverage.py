@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 from scipy.special import gammaln
 
+from nichechain.alias import RowSampler
 from nichechain.errors import NichechainError
 
 Floats = NDArray[np.float64]
@@ -230,33 +231,3 @@ def _at_least_once(probability: Floats, trials: int) -> Floats:
     with np.errstate(divide="ignore"):
         some: Floats = -np.expm1(trials * np.log1p(-np.minimum(probability, 1.0)))
     return some
-
-
-class RowSampler:
-    """Draws columns of a row-stochastic matrix by inverting its rows' distribution functions.
-
-    Parameters
-    ----------
-    matrix : (m, S) scipy.sparse.csr_array
-    """
-
-    def __init__(self, matrix: sparse.csr_array) -> None:
-        matrix = matrix.copy()
-        matrix.eliminate_zeros()
-        sizes = np.diff(matrix.indptr)
-        rows = np.repeat(np.arange(matrix.shape[0]), sizes)
-        before = np.concatenate([[0.0], np.cumsum(matrix.data)])
-        within = before[1:] - before[matrix.indptr[:-1]][rows]
-        total = np.bincount(rows, matrix.data, matrix.shape[0])
-        # Row i fills the interval from i to i + 1, so one sorted search serves all rows.
-        self._upper = rows + within / total[rows]
-        self._upper[matrix.indptr[1:][sizes > 0] - 1] = np.flatnonzero(sizes) + 1.0
-        self._columns = matrix.indices
-
-    def draw(self, rows: Ints, rng: np.random.Generator) -> Ints:
-        """One column for each row (N,), drawn with the row's probabilities, (N,)."""
-        # The sum could round up to the next row's interval.
-        at = np.minimum(rows + rng.random(rows.size), np.nextafter(rows + 1.0, 0.0))
-        found = np.searchsorted(self._upper, at, side="right")
-        drawn: Ints = self._columns[found].astype(np.int64)
-        return drawn

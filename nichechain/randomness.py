@@ -43,6 +43,12 @@ class Purpose(IntEnum):
     """A birth in a lineage without selection; index: its elite, lineage and generation."""
     PREDICTION = 13
     """Lineages simulated on a draw of T; index: the draw."""
+    FOLDS = 20
+    """Which elites are held out together."""
+    THINNING = 21
+    """Which births are left out to see what fewer would have told; index: the repeat."""
+    RESAMPLING = 22
+    """Runs or elites drawn with replacement; index: the resample."""
 
 
 def keyed(seed: int, purpose: Purpose, index: int = 0) -> np.random.Generator:

@@ -93,6 +93,9 @@ class Meta:
         Name and SHA-256 of the elites file.
     parts : tuple of dict
         Name, SHA-256 and number of rows of every part, in order.
+    origin : dict, optional
+        Where the births come from, if not from a build: ``kind`` is ``merged`` or ``imported``, and
+        the rest tells of what. No build goes on with such an archive.
     """
 
     config: BuildConfig
@@ -102,6 +105,12 @@ class Meta:
     step: int
     elites: dict[str, Any]
     parts: tuple[dict[str, Any], ...]
+    origin: dict[str, Any] | None = None
+
+    @property
+    def imported(self) -> bool:
+        """Whether the births come from another program's log."""
+        return self.origin is not None and self.origin["kind"] == "imported"
 
     @property
     def complete(self) -> bool:
@@ -143,6 +152,9 @@ def read_meta(folder: Path) -> Meta:
         )
         if sum(part["rows"] for part in parts) != total:
             raise ArchiveError(f"{path} is damaged: its parts do not add up to {total} births")
+        origin = values.get("origin")
+        if origin is not None and origin["kind"] not in ("merged", "imported"):
+            raise ArchiveError(f"{path} is {origin['kind']!r}, which this version cannot read")
         facts = values["domain"]
         start = facts["start"]
         return Meta(
@@ -158,6 +170,7 @@ def read_meta(folder: Path) -> Meta:
             int(values["step"]),
             elites,
             parts,
+            origin,
         )
     except ArchiveError:
         raise
@@ -204,12 +217,17 @@ class Writer:
         Its archive, if it holds one, is continued.
     config : BuildConfig
     facts : DomainFacts
+    origin : dict, optional
+        As in :class:`Meta`, for births that no build made.
     """
 
-    def __init__(self, folder: Path, config: BuildConfig, facts: DomainFacts) -> None:
+    def __init__(
+        self, folder: Path, config: BuildConfig, facts: DomainFacts, origin: dict[str, Any] | None = None
+    ) -> None:
         self._folder = folder
         self._config = config
         self._facts = facts
+        self._origin = origin
         self._full: list[dict[str, Any]] = []
         self._tail = births.schema(len(config.shape)).empty_table()
         if is_archive(folder):
@@ -249,6 +267,8 @@ class Writer:
             "elites": elites,
             "parts": parts,
         }
+        if self._origin is not None:
+            meta["origin"] = self._origin
         meta["sha256"] = _checksum(meta)
         self._write(_META, json.dumps(meta, indent=2).encode())
         self._sweep({_META, elites["file"], *(part["file"] for part in parts)})

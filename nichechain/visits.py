@@ -11,9 +11,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
+from nichechain.alias import RowSampler
 from nichechain.chain.draws import Root, generations, transition_draws
 from nichechain.chain.model import Matrix, NicheChain
-from nichechain.coverage import RowSampler, check_lengths
+from nichechain.coverage import check_lengths
 from nichechain.errors import NichechainError
 from nichechain.evolvability import DRAWS, Convention
 from nichechain.niches import Niche

@@ -7,11 +7,14 @@ land anywhere, (c) anywhere alike. A niche of few births borrows from them.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 from scipy.signal import fftconvolve
 
+from nichechain.alias import RowSampler
 from nichechain.chain.counts import TransitionCounts
 from nichechain.niches import GridNiches
 
@@ -89,13 +92,12 @@ class BaseMeasure:
     def sample(self, parent: Ints, rng: np.random.Generator) -> Ints:
         """One state drawn from B_i for each parent state, any shape."""
         flat = parent.ravel()
-        kind = rng.choice(3, size=flat.size, p=self.weights)
-        child = np.empty(flat.size, np.int64)
-        pooled = kind == 0
-        child[pooled] = _draw(self.destination, int(pooled.sum()), rng)
-        uniform = kind == 2
+        pooled, displaced_too = np.cumsum(self.weights)[:2]
+        kind = rng.random(flat.size)
+        child = _draw(self._destinations, flat.size, rng)
+        uniform = kind >= displaced_too
         child[uniform] = rng.integers(self.niches.states, size=int(uniform.sum()))
-        displaced = np.flatnonzero(kind == 1)
+        displaced = np.flatnonzero((kind >= pooled) & ~uniform)
         child[displaced] = self._sample_displaced(flat[displaced], rng)
         return child.reshape(parent.shape)
 
@@ -108,6 +110,14 @@ class BaseMeasure:
         share = self.displacement[where] / self.within[parent[inside]]
         result[inside] = (1.0 - self.leaving) * share
         return result
+
+    @cached_property
+    def _destinations(self) -> RowSampler:
+        return RowSampler(sparse.csr_array(self.destination[None, :]))
+
+    @cached_property
+    def _displacements(self) -> RowSampler:
+        return RowSampler(sparse.csr_array(self.displacement.reshape(1, -1)))
 
     @property
     def within(self) -> Floats:
@@ -123,12 +133,12 @@ class BaseMeasure:
         shape = np.array(self.niches.shape)
         child = np.full(parent.size, n, np.int64)
         outsiders = parent >= n
-        child[outsiders] = _draw(self.destination, int(outsiders.sum()), rng)
+        child[outsiders] = _draw(self._destinations, int(outsiders.sum()), rng)
         open_ = np.flatnonzero(~outsiders & (rng.random(parent.size) >= self.leaving))
         # Drawing again whatever lands off the grid conditions the kernel on staying in it.
         while open_.size:
             cells = np.stack(np.unravel_index(parent[open_], self.niches.shape), axis=1)
-            moves = _draw(self.displacement.ravel(), open_.size, rng)
+            moves = _draw(self._displacements, open_.size, rng)
             step = np.stack(np.unravel_index(moves, self.displacement.shape), axis=1) - (shape - 1)
             landed = cells + step
             stays = ((landed >= 0) & (landed < shape)).all(axis=1)
@@ -144,9 +154,5 @@ def _cells_apart(niches: GridNiches, parent: Ints, child: Ints) -> tuple[Ints, .
     return tuple((b - a + k - 1).astype(np.int64) for a, b, k in zip(start, end, niches.shape, strict=True))
 
 
-def _draw(probability: Floats, size: int, rng: np.random.Generator) -> Ints:
-    cumulative = np.cumsum(probability)
-    drawn = np.searchsorted(cumulative, rng.random(size) * cumulative[-1], side="right")
-    # Rounding could carry the product up to the last sum itself.
-    inside: Ints = np.minimum(drawn, probability.size - 1).astype(np.int64)
-    return inside
+def _draw(sampler: RowSampler, size: int, rng: np.random.Generator) -> Ints:
+    return sampler.draw(np.zeros(size, np.int64), rng)

@@ -53,7 +53,7 @@ class TransitionCounts:
         niches : GridNiches
             The niches that the numbers belong to.
         elite : (N,) ints, optional
-            uid of the parent, which tells siblings from cousins.
+            Number of the parent, which tells siblings from cousins; -1 where it is not known.
 
         Raises
         ------
@@ -70,23 +70,41 @@ class TransitionCounts:
         uid = np.asarray(elite, np.int64)
         if uid.shape != i.shape:
             raise NichechainError(f"elites have shape {uid.shape} and parents {i.shape}, but must be alike")
-        kinds, size = np.unique(np.stack([i[moved], uid[moved], j[moved]]), axis=1, return_counts=True)
+        # Children whose parents are not known are not siblings for that.
+        own = moved & (uid != NONE)
+        kinds, size = np.unique(np.stack([i[own], uid[own], j[own]]), axis=1, return_counts=True)
         return replace(counts, families=np.vstack([kinds, size]).T)
 
     @classmethod
-    def from_pairs(cls, parent: ArrayLike, child: ArrayLike, niches: GridNiches) -> TransitionCounts:
-        """Counts of pairs of states, of parents (N,) and of their children (N,).
+    def from_pairs(
+        cls, parent: ArrayLike, child: ArrayLike, niches: GridNiches, n: ArrayLike | None = None
+    ) -> TransitionCounts:
+        """Counts of pairs of states.
+
+        Parameters
+        ----------
+        parent, child : (N,) ints
+            States of parents and of their children.
+        niches : GridNiches
+            The niches that the numbers belong to.
+        n : (N,) ints, optional
+            How many births each pair stands for; by default one.
 
         Raises
         ------
         NichechainError
-            If the lengths differ or a state does not exist.
+            If the lengths differ, a state does not exist or a number is negative.
         """
         i, j = np.asarray(parent, np.int64), np.asarray(child, np.int64)
         _check_pairs(i, j, niches, lowest=0)
+        size = np.ones(i.size, np.int64) if n is None else _multiplicities(n, i.shape)
         shape = (niches.states, niches.states)
-        matrix = sparse.coo_array((np.ones(i.size, np.int64), (i, j)), shape=shape).tocsr()
-        return cls(matrix, niches, np.bincount(j, minlength=niches.states))
+        matrix = sparse.coo_array((size, (i, j)), shape=shape).tocsr()
+        # A pair that stands for no birth is no transition.
+        matrix.eliminate_zeros()
+        visits = np.zeros(niches.states, np.int64)
+        np.add.at(visits, j, size)
+        return cls(matrix, niches, visits)
 
     def __add__(self, other: TransitionCounts) -> TransitionCounts:
         """Pooled counts.
@@ -134,6 +152,15 @@ class TransitionCounts:
     def births_outside(self) -> int:
         """Births out of bounds."""
         return int(self.visits[len(self.niches) :].sum())
+
+
+def _multiplicities(n: ArrayLike, shape: tuple[int, ...]) -> Ints:
+    given = np.asarray(n)
+    if given.shape != shape:
+        raise NichechainError(f"n has shape {given.shape}, but must have {shape}, one number for each pair")
+    if not (np.isfinite(given).all() and (given >= 0).all() and (given == np.floor(given)).all()):
+        raise NichechainError("n has numbers that are negative or no whole numbers, but counts births")
+    return given.astype(np.int64)
 
 
 def _check_pairs(parent: Ints, child: Ints, niches: GridNiches, *, lowest: int) -> None:

@@ -14,6 +14,10 @@ from nichechain.chain.base_measure import BaseMeasure
 from nichechain.chain.counts import TransitionCounts
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+# States below which adding up in a dense matrix beats sorting.
+_DENSE_STATES = 1_500
 
 # A draw of the prior's part of a row leaves at most this much of it, in expectation, in one place.
 _REMAINDER = 1e-4
@@ -86,10 +90,12 @@ class DirichletPosterior:
         # In a row of few states, gamma variates of tiny shape would all underflow.
         if pieces >= max(states, _FEW_STATES):
             return sparse.csr_array(self._draw_whole_rows(known, (rows, columns, share), rng))
-        left = rng.random((states, pieces)) ** (1.0 / self.strength)
+        # Each piece leaves U^(1/s) of what it was broken from: minus its logarithm is exponential.
+        left = np.ones((states, pieces + 1))
+        np.cumsum(rng.standard_exponential((states, pieces - 1)), axis=1, out=left[:, 1:-1])
+        np.exp(left[:, 1:-1] / -self.strength, out=left[:, 1:-1])
         left[:, -1] = 0.0
-        before = np.cumprod(np.hstack([np.ones((states, 1)), left[:, :-1]]), axis=1)
-        prior = before * (1.0 - left) * (1.0 - known)[:, None]
+        prior = (left[:, :-1] - left[:, 1:]) * (1.0 - known)[:, None]
         parents = np.repeat(np.arange(states), pieces)
         landed = self.base.sample(parents, rng)
         data = np.concatenate([share, prior.ravel()])
@@ -98,7 +104,7 @@ class DirichletPosterior:
             stays = index[0] < states - 1
             data = np.append(data[stays], 1.0)
             index = np.append(index[0][stays], states - 1), np.append(index[1][stays], states - 1)
-        return sparse.coo_array((data, index), shape=matrix.shape).tocsr()
+        return _collected(data, index, states)
 
     def _draw_whole_rows(
         self, known: Floats, observed: tuple[Floats, Floats, Floats], rng: np.random.Generator
@@ -118,3 +124,11 @@ class DirichletPosterior:
         if self.strength > states:
             return max(states, _FEW_STATES)
         return 1 + math.ceil(math.log(_REMAINDER) / math.log(self.strength / (1.0 + self.strength)))
+
+
+def _collected(data: Floats, index: tuple[Ints, Ints], states: int) -> sparse.csr_array:
+    """Entries (row, column) added up, (S, S)."""
+    if states > _DENSE_STATES:
+        return sparse.coo_array((data, index), shape=(states, states)).tocsr()
+    dense = np.bincount(index[0] * states + index[1], data, states * states)
+    return sparse.csr_array(dense.reshape(states, states))

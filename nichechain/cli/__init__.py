@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import keyword
 import os
 import sys
 from collections.abc import Sequence
@@ -11,6 +12,10 @@ COMMANDS = {
     "build": "fill an archive: MAP-Elites that records who was born where",
     "info": "what is in an archive, and what made it",
     "evolvability": "l-evolvability of niches, or of an elite",
+    "estimate": "the estimate of T, how well it foretells births, and whether they are enough",
+    "compare": "l-evolvability, reach and coverage of one archive against another",
+    "merge": "archives of one domain, niches and mutation as one",
+    "import": "births of another program's search, from CSV or Parquet",
     "plot": "heat maps of an archive and graphs of which niches lead to which",
     "explore": "a page on which one clicks a niche and sees where its descendants go",
     "validate": "whether the chain is one, and whether its predictions come true",
@@ -45,8 +50,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _fail(f"there is no command {words[0]!r}: it must be one of {', '.join(COMMANDS)}")
     from nichechain.errors import NichechainError
 
+    # A module cannot bear the name of a keyword.
+    name = f"{words[0]}_" if keyword.iskeyword(words[0]) else words[0]
     try:
-        module = importlib.import_module(f"nichechain.cli.{words[0]}")
+        module = importlib.import_module(f"nichechain.cli.{name}")
         status: int = module.run(words[1:])
         sys.stdout.flush()
     except NichechainError as error:

@@ -36,7 +36,7 @@ def run(arguments: Sequence[str]) -> int:
         "births": meta.births,
         "evaluations_asked_for": config.evaluations,
         "niches": len(archive.niches),
-        "niches_filled": archive.filled,
+        "niches_filled": len(archive.niches) - counts.never_filled,
         "niches_never_filled": counts.never_filled,
         "niches_filled_never_parent": counts.never_parent,
         "rows_of_T_observed": counts.rows_observed,
@@ -47,7 +47,7 @@ def run(arguments: Sequence[str]) -> int:
         "bytes": size,
     }
     if command.format == "json":
-        made_by = {"configuration": config.to_json(), "versions": meta.versions}
+        made_by = {"configuration": config.to_json(), "origin": meta.origin, "versions": meta.versions}
         print(json.dumps({**content, **made_by}, indent=2))
         return 0
     grid = " by ".join(map(str, config.shape))
@@ -55,13 +55,15 @@ def run(arguments: Sequence[str]) -> int:
         f"{name} {low:g} to {high:g} {unit}" for name, (low, high) in zip(names, config.bounds, strict=True)
     )
     state = "complete" if meta.complete else f"unfinished, {config.evaluations} asked for"
+    if meta.origin is not None:
+        state = meta.origin["kind"]
     rows = {
         "archive": str(archive.folder),
         "births": f"{meta.births} ({state})",
         "  outside the grid": str(content["births_outside"]),
         "  failed": str(content["births_failed"]),
         "grid": f"{grid} over {spans}",
-        "niches filled": f"{archive.filled} of {len(archive.niches)}",
+        "niches filled": f"{content['niches_filled']} of {len(archive.niches)}",
         "  never filled": str(content["niches_never_filled"]),
         "  filled, never a parent": str(content["niches_filled_never_parent"]),
         "rows of T observed": str(content["rows_of_T_observed"]),
@@ -71,14 +73,25 @@ def run(arguments: Sequence[str]) -> int:
     }
     shown = console.console()
     shown.print(console.facts(rows))
-    shown.print("\n[bold]Configuration[/]")
-    shown.print(console.facts({name: _plain(value) for name, value in config.to_json().items()}))
+    if meta.imported:
+        assert meta.origin is not None
+        shown.print("\n[bold]Imported from[/]")
+        shown.print(console.facts({name: _plain(value) for name, value in _origin(meta.origin).items()}))
+    else:
+        shown.print("\n[bold]Configuration[/]" + (" of the first run" if meta.origin else ""))
+        shown.print(console.facts({name: _plain(value) for name, value in config.to_json().items()}))
     shown.print("\n[bold]Versions[/]")
     shown.print(console.facts(meta.versions))
     return 0
 
 
+def _origin(origin: dict[str, Any]) -> dict[str, Any]:
+    """The log and the columns that were read."""
+    columns = {f"  {name}": value for name, value in origin["columns"].items()}
+    return {"file": origin["file"], "sha256": origin["sha256"], **columns}
+
+
 def _plain(value: Any) -> str:
-    if isinstance(value, tuple):
+    if isinstance(value, (tuple, list)):
         return ", ".join(_plain(part) for part in value)
     return f"{value:g}" if isinstance(value, float) else str(value)

@@ -69,6 +69,37 @@ def test_pairs_by_hand():
     assert (counts.never_filled, counts.never_parent, counts.rows_observed) == (4, 1, 2)
 
 
+def test_pairs_stand_for_many_births():
+    pairs = [0, 0, 5, 6, 2], [1, 1, 6, 0, 2]
+    n = [3, 1, 2, 5, 0]
+    counts = TransitionCounts.from_pairs(*pairs, GRID, n)
+    singly = TransitionCounts.from_pairs(*(np.repeat(states, n) for states in pairs), GRID)
+    np.testing.assert_array_equal(counts.matrix.toarray(), singly.matrix.toarray())
+    np.testing.assert_array_equal(counts.visits, singly.visits)
+    # A pair of no births leaves nothing behind.
+    assert counts.matrix.nnz == 3
+
+
+@pytest.mark.parametrize(
+    ("n", "message"),
+    [
+        ([1], r"n has shape \(1,\), but must have \(2,\), one number for each pair"),
+        ([1, -1], "negative or no whole numbers"),
+        ([1, 0.5], "negative or no whole numbers"),
+        ([1, np.nan], "negative or no whole numbers"),
+    ],
+)
+def test_multiplicities_are_refused(n, message):
+    with pytest.raises(NichechainError, match=message):
+        TransitionCounts.from_pairs([0, 1], [1, 2], GRID, n)
+
+
+def test_children_of_unknown_parents_are_no_siblings():
+    counts = TransitionCounts.from_births([0, 0, 0], [1, 1, 2], GRID, elite=[-1, -1, 4])
+    assert counts.families.tolist() == [[0, 4, 2, 1]]
+    assert counts.births[0] == 3
+
+
 def test_clipped_niches_have_no_outside():
     niches = GridNiches((3, 2), ((0.0, 3.0), (0.0, 2.0)), "clip")
     counts = TransitionCounts.from_pairs([0, 5], [5, 5], niches)

@@ -1,0 +1,83 @@
+"""Counts of some of the births only: of one run, of a window of steps, of those that were accepted."""
+
+from __future__ import annotations
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+
+from nichechain.births import NONE
+from nichechain.chain.counts import TransitionCounts
+from nichechain.errors import NichechainError
+from nichechain.niches import GridNiches
+
+
+def counts_of(
+    births: pa.Table,
+    niches: GridNiches,
+    *,
+    run: int | None = None,
+    steps: tuple[int, int] | None = None,
+    accepted: bool = False,
+) -> TransitionCounts:
+    """Counts of births.
+
+    Parameters
+    ----------
+    births : pyarrow.Table
+        Columns of :mod:`nichechain.births`; elites of different runs are kept apart.
+    niches : GridNiches
+        The niches that the states of the births belong to.
+    run : int, optional
+        Only births of this run.
+    steps : (int, int), optional
+        Only births from the first of these steps up to, and without, the second.
+    accepted : bool
+        Only births that became the elite of their niche. Their T is that of the children that a
+        search kept, not of all that parents have.
+
+    Returns
+    -------
+    TransitionCounts
+        Niches that only other births fell in count as never filled.
+
+    Raises
+    ------
+    NichechainError
+        If there is no such run, the window is empty, or births do not say what is asked about.
+    """
+    if run is not None:
+        births = births.filter(pc.equal(births["run"], _run(births, run)))
+    if steps is not None:
+        first, end = steps
+        if not 0 <= first < end:
+            raise NichechainError(f"steps are {first} to {end}, but must be a window such as (0, 100)")
+        step = _said(births, "step", "their step")
+        births = births.filter(pc.and_(pc.greater_equal(step, first), pc.less(step, end)))
+    if accepted:
+        births = births.filter(_said(births, "accepted", "whether they were accepted"))
+    parent, child, elite, number = (
+        births[name].fill_null(NONE).to_numpy().astype(np.int64)
+        for name in ("parent_niche", "child_niche", "parent_uid", "run")
+    )
+    # One number for an elite of all runs.
+    span = 1 + elite.max(initial=0)
+    elite = np.where(elite == NONE, NONE, number * span + elite)
+    return TransitionCounts.from_births(parent, child, niches, elite=elite)
+
+
+def _run(births: pa.Table, run: int) -> int:
+    known = pc.unique(births["run"]).to_pylist()
+    if run not in known:
+        raise NichechainError(
+            f"run is {run}, but there are runs {min(known, default=0)} to {max(known, default=0)}"
+        )
+    return run
+
+
+def _said(births: pa.Table, column: str, what: str) -> pa.ChunkedArray:
+    """A column that must not have nulls."""
+    values = births[column]
+    if values.null_count:
+        raise NichechainError(f"{values.null_count} births do not say {what}, so none can be chosen by it")
+    return values

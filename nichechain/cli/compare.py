@@ -1,0 +1,106 @@
+"""``nichechain compare``: one archive against another."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import tyro
+
+from nichechain.cli import console
+from nichechain.errors import NichechainError
+
+if TYPE_CHECKING:
+    from nichechain.chain.contrast import Contrast
+
+_NAMES = {
+    "evolvability": "reached by {lineages} lineages",
+    "reach": "reached by one lineage",
+    "coverage": "filled by {births} births",
+}
+
+
+@dataclass(frozen=True)
+class Compare:
+    """l-evolvability, reach and coverage of one archive against another of the same niches."""
+
+    first: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="A")]
+    """Archive folder, or the name of an archive that ships with nichechain."""
+    second: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="B")]
+    """Another: operators, seeds, searches or domains may differ, niches not."""
+    l: int = 5  # noqa: E741  # the paper's name
+    """Generations to look ahead."""
+    lineages: int = 100
+    """Independent lineages U: l times U descendants."""
+    min_births: int = 20
+    """Niches with fewer births behind their row of T, in either archive, are left out."""
+    resamples: int = 100
+    """Resamples of runs, or of elites where an archive has one run, for the interval."""
+    draws: int = 4
+    """Posterior draws of T for each resample."""
+    seed: int = 0
+    """Of resamples and draws."""
+    format: Literal["table", "csv", "json"] = "table"
+    """How to write it."""
+
+
+def run(arguments: Sequence[str]) -> int:
+    """Compare."""
+    command = console.parse(Compare, arguments)
+    from nichechain import store
+    from nichechain.archive import load
+    from nichechain.chain.contrast import contrast
+    from nichechain.coverage import check_lengths
+
+    check_lengths(command.l, command.lineages)
+    if command.seed < 0:
+        raise NichechainError(f"--seed is {command.seed}, but must not be negative")
+    archives = load(command.first), load(command.second)
+    if archives[0].niches != archives[1].niches:
+        raise NichechainError(
+            f"{command.first} and {command.second} have different niches: compare archives of the same grid, "
+            "bounds and outside"
+        )
+    births = [store.read_births(archive.folder, archive.meta) for archive in archives]
+    with console.spinner("resampling"):
+        found = contrast(
+            births[0],
+            births[1],
+            archives[0].niches,
+            l=command.l,
+            lineages=command.lineages,
+            min_births=command.min_births,
+            resamples=command.resamples,
+            draws=command.draws,
+            seed=command.seed,
+        )
+    if command.format == "csv":
+        print(found.to_frame().to_csv(index=False), end="")
+    elif command.format == "json":
+        print(json.dumps(asdict(found), indent=2))
+    else:
+        _show(found)
+    return 0
+
+
+def _show(found: Contrast) -> None:
+    shown = console.console()
+    shown.print(
+        f"[bold]B against A[/] in niches; evolvability and reach after {found.l} generations, "
+        f"over {found.niches} niches with {found.min_births} births in both"
+    )
+    table = console.table("niches", "A", "B", "B − A", "90 % interval")
+    for row in found.rows:
+        name = _NAMES[row.figure].format(lineages=found.lineages, births=found.births)
+        interval = f"{row.low:+.2f} to {row.high:+.2f}"
+        table.add_row(name, f"{row.first:.2f}", f"{row.second:.2f}", f"{row.difference:+.2f}", interval)
+    shown.print(table)
+    for name, (kind, number) in zip("AB", found.clusters, strict=True):
+        shown.print(f"{name}: resampled over {number} {kind}")
+    if any(kind == "elites" for kind, _ in found.clusters):
+        shown.print(
+            "One run says nothing of how runs differ: the interval is that of other elites within it. "
+            "Merge several runs to have it over runs."
+        )

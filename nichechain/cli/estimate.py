@@ -1,0 +1,241 @@
+"""``nichechain estimate``: what births say of T, how well, and whether they are enough."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import tyro
+
+from nichechain.cli import console
+from nichechain.errors import NichechainError
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from nichechain.archive import Archive
+    from nichechain.chain.comparison import Comparison
+    from nichechain.chain.stability import RankStability
+
+FORMATS = (".png", ".svg", ".pdf")
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """The estimate of T from births; which estimator foretells births best; whether they are enough."""
+
+    path: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="PATH")]
+    """Archive folder, or the name of an archive that ships with nichechain."""
+    compare: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
+    """Hold out the children of some elites and see which estimator foretells them best."""
+    stability: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
+    """Thin the births and see whether fewer would have ranked the niches alike."""
+    estimator: Literal["empirical-bayes", "dirichlet", "mle"] = "empirical-bayes"
+    """T from births: posteriors around a pooled or a uniform base, or row-normalised counts."""
+    folds: Annotated[int | None, console.option("INT", "5")] = None
+    """For --compare: parts of the elites, each held out in its turn."""
+    thin: Annotated[Literal["elite", "birth"] | None, console.option("{elite,birth}", "elite")] = None
+    """For --stability: leave out whole elites with their children, or single births."""
+    repeats: Annotated[int | None, console.option("INT", "3")] = None
+    """For --stability: how often to thin to each part."""
+    min_births: int = 20
+    """For --stability: niches with fewer births behind their row of T are not ranked."""
+    out: Annotated[Path | None, console.option("FILE", "none")] = None
+    """For --stability: a picture of it, .png, .svg or .pdf."""
+    seed: int = 0
+    """Of folds, thinning and draws."""
+    format: Literal["table", "csv", "json"] = "table"
+    """How to write it."""
+
+
+def run(arguments: Sequence[str]) -> int:
+    """Say what the births say of T."""
+    command = console.parse(Estimate, arguments)
+    _check(command)
+    from nichechain.archive import load
+
+    archive = load(command.path)
+    if command.compare:
+        _compare(command, archive)
+    elif command.stability:
+        _stability(command, archive)
+    else:
+        _estimate(command, archive)
+    return 0
+
+
+def _check(command: Estimate) -> None:
+    if command.compare and command.stability:
+        raise NichechainError("--compare and --stability exclude each other: ask for one of them")
+    belongs: dict[str, tuple[bool, dict[str, object]]] = {
+        "--compare": (command.compare, {"--folds": command.folds}),
+        "--stability": (
+            command.stability,
+            {"--thin": command.thin, "--repeats": command.repeats, "--out": command.out},
+        ),
+    }
+    for owner, (asked, options) in belongs.items():
+        for name, value in options.items():
+            if value is not None and not asked:
+                raise NichechainError(f"{name} belongs to {owner}, which is not given")
+    for name in ("seed", "min_births"):
+        if getattr(command, name) < 0:
+            option = name.replace("_", "-")
+            raise NichechainError(f"--{option} is {getattr(command, name)}, but must not be negative")
+    if command.out is not None:
+        if command.out.suffix.lower() not in FORMATS:
+            raise NichechainError(
+                f"--out is {str(command.out)!r}, but must end in one of {', '.join(FORMATS)}"
+            )
+        if not command.out.parent.is_dir():
+            raise NichechainError(
+                f"--out is {str(command.out)!r}, but there is no folder {command.out.parent}"
+            )
+
+
+def _estimate(command: Estimate, archive: Archive) -> None:
+    chain = archive.chain(command.estimator)
+    counts, posterior = archive.counts, chain.posterior
+    births = int(counts.births.sum())
+    content: dict[str, Any] = {
+        "estimator": chain.estimator,
+        "births_of_parents": births,
+        "births_outside": counts.births_outside,
+        "niches": len(archive.niches),
+        "rows_observed": counts.rows_observed,
+        "never_filled": counts.never_filled,
+        "filled_never_parent": counts.never_parent,
+    }
+    if posterior is not None:
+        destination, displacement, uniform = posterior.base.weights.tolist()
+        effect = float((counts.births * posterior.design_effect).sum() / max(1, births))
+        content |= {
+            "strength": posterior.strength,
+            "weight_destination": destination,
+            "weight_displacement": displacement,
+            "weight_uniform": uniform,
+            "births_worth_one": effect,
+        }
+    if command.format == "table":
+        rows = {
+            "estimator": chain.estimator,
+            "births with a parent": str(births),
+            "  outside the grid": f"{counts.births_outside}, initial ones among them",
+            "rows of T observed": f"{counts.rows_observed} of {len(archive.niches)}",
+            "  never filled": str(counts.never_filled),
+            "  filled, never a parent": str(counts.never_parent),
+        }
+        if posterior is not None:
+            rows |= {
+                "strength of the base": f"{posterior.strength:.3g} births",
+                "  where children land": f"{destination:.1%}",
+                "  how far they land": f"{displacement:.1%}",
+                "  anywhere": f"{uniform:.1%}",
+                "births worth one": f"{effect:.3g}: children of one elite take after each other"
+                if effect > 1
+                else "1: every birth counts in full",
+            }
+        console.console().print(console.facts(rows))
+        return
+    import pandas as pd
+
+    _write(pd.DataFrame([content]), content, command)
+
+
+def _compare(command: Estimate, archive: Archive) -> None:
+    from nichechain.chain.comparison import compare_estimators
+
+    with console.spinner("holding out elites"):
+        found = compare_estimators(
+            archive.counts, folds=5 if command.folds is None else command.folds, seed=command.seed
+        )
+    frame = found.to_frame()
+    if command.format != "table":
+        about = {"folds": found.folds, "elites": found.elites, "seed": found.seed}
+        _write(frame, {**about, "estimators": _records(frame)}, command)
+        return
+    _show_comparison(found)
+
+
+def _show_comparison(found: Comparison) -> None:
+    shown = console.console()
+    shown.print(
+        f"[bold]Births foretold[/]: the children of {found.elites} elites, "
+        f"a {found.folds}th of the elites held out at a time"
+    )
+    best = found.rows[0].estimator
+    table = console.table("estimator", "impossible", "nats per birth", "against the first")
+    for row in found.rows:
+        gain = "" if row.estimator == best else f"{row.difference:+.3f} ± {row.standard_error:.3f}"
+        table.add_row(row.estimator, f"{row.impossible:.1%}", f"{row.log_likelihood:.3f}", gain)
+    shown.print(table)
+    shown.print(
+        "impossible: births that were given probability 0 and happened. nats per birth: mean\n"
+        "log-probability of the others. against the first: the difference on just these,\n"
+        "± its standard error by elite."
+    )
+
+
+def _stability(command: Estimate, archive: Archive) -> None:
+    from nichechain.chain.stability import rank_stability
+
+    with console.spinner("thinning births"):
+        found = rank_stability(
+            archive.counts,
+            thin=command.thin or "elite",
+            repeats=3 if command.repeats is None else command.repeats,
+            min_births=command.min_births,
+            estimator=command.estimator,
+            seed=command.seed,
+        )
+    if command.out is not None:
+        _draw(found, command.out)
+    if command.format != "table":
+        frame = found.to_frame()
+        about = {
+            "answer": found.answer,
+            "niches": found.niches,
+            "thin": found.thin,
+            "halves": found.halves.tolist(),
+            "enough": found.enough,
+        }
+        _write(frame, {**about, "parts": _records(frame)}, command)
+        return
+    shown = console.console()
+    shown.print(
+        f"[bold]Ranking of {found.niches} niches[/] by {found.l}-evolvability, thinned births against all: "
+        "Spearman's correlation"
+    )
+    table = console.table("part", "births", "mean", "lowest", "highest")
+    for row in found.to_frame().itertuples():
+        values = (f"{value:.2f}" for value in (row.spearman, row.lowest, row.highest))
+        table.add_row(f"{row.fraction:.0%}", f"{row.births:.0f}", *values)
+    shown.print(table)
+    shown.print(found.answer)
+    if command.out is not None:
+        shown.print(f"wrote {command.out}")
+
+
+def _draw(found: RankStability, out: Path) -> None:
+    # A figure made directly, not through pyplot, needs no display and leaves no state behind.
+    from matplotlib.figure import Figure
+
+    from nichechain.plots.stability import plot_stability
+
+    figure = Figure(figsize=(6.4, 4.8))
+    plot_stability(found, figure.add_subplot())
+    figure.savefig(out, dpi=200, bbox_inches="tight", pad_inches=0.15)
+
+
+def _records(frame: pd.DataFrame) -> Any:
+    # NaN is no JSON; pandas writes null.
+    return json.loads(frame.to_json(orient="records"))
+
+
+def _write(frame: pd.DataFrame, content: dict[str, Any], command: Estimate) -> None:
+    print(
+        frame.to_csv(index=False) if command.format == "csv" else json.dumps(content, indent=2) + "\n", end=""
+    )

@@ -1,0 +1,93 @@
+"""``nichechain import``: births of another program's search."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from nichechain.cli import console
+from nichechain.config import Outside
+from nichechain.errors import NichechainError
+
+
+@dataclass(frozen=True)
+class Import:
+    """Make an archive of births that another program logged: no domain is needed, nothing is evaluated."""
+
+    log: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FILE")]
+    """CSV with a header, or Parquet: one row per evaluated child."""
+    grid: Annotated[str, tyro.conf.arg(metavar="NXxNY")]
+    """Cells of the grid along each axis of behavior."""
+    bounds: Annotated[str, tyro.conf.arg(metavar="X0,X1,Y0,Y1")]
+    """Bounds of the grid, in units of behavior."""
+    out: Annotated[Path, tyro.conf.arg(metavar="PATH")]
+    """Archive folder to make."""
+    outside: Outside = "state"
+    """Where a behavior out of bounds belongs: a state of its own, one never left, or the nearest niche."""
+    parent: Annotated[str | None, console.option("COLUMN", "parent_niche")] = None
+    """Column with the number of the parent's niche; empty for initial births."""
+    child: Annotated[str | None, console.option("COLUMN", "child_niche")] = None
+    """Column with the number of the child's niche; empty where the child failed."""
+    parent_behavior: Annotated[str | None, console.option("COLUMN,COLUMN", "none")] = None
+    """In place of --parent: columns with the parent's behavior."""
+    child_behavior: Annotated[str | None, console.option("COLUMN,COLUMN", "none")] = None
+    """In place of --child: columns with the child's behavior."""
+    run: Annotated[str | None, console.option("COLUMN", "one run")] = None
+    """Column that tells runs apart."""
+    uid: Annotated[str | None, console.option("COLUMN", "the row's number")] = None
+    """Column with the child's number."""
+    elite: Annotated[str | None, console.option("COLUMN", "none")] = None
+    """Column with the parent's number: lets children of one parent count as related."""
+    step: Annotated[str | None, console.option("COLUMN", "none")] = None
+    """Column with the step of the search."""
+    names: Annotated[str | None, console.option("NAME,NAME", "the behavior columns")] = None
+    """What the axes of behavior are called."""
+    unit: str = "units"
+    """Unit of behavior."""
+
+
+def run(arguments: Sequence[str]) -> int:
+    """Import."""
+    command = console.parse(Import, arguments)
+    for name in ("parent", "child"):
+        if getattr(command, name) is not None and getattr(command, f"{name}_behavior") is not None:
+            raise NichechainError(f"--{name} and --{name}-behavior exclude each other: give one of them")
+    from nichechain.archive import load
+    from nichechain.importing import Axes, Columns, import_births
+    from nichechain.niches import GridNiches, parse_bounds, parse_shape
+
+    columns = Columns(
+        _words(command.parent_behavior) or command.parent or "parent_niche",
+        _words(command.child_behavior) or command.child or "child_niche",
+        command.run,
+        command.uid,
+        command.elite,
+        command.step,
+    )
+    niches = GridNiches(parse_shape(command.grid), parse_bounds(command.bounds), command.outside)
+    axes = Axes(_words(command.names), command.unit)
+    import_births(command.log, command.out, niches, columns=columns, axes=axes)
+    counts = load(command.out).counts
+    rows = {
+        "births": f"{int(counts.visits.sum())}, {int(counts.births.sum())} of them with a parent",
+        "  outside the grid": str(counts.births_outside),
+        "niches filled": f"{len(niches) - counts.never_filled} of {len(niches)}",
+        "rows of T observed": f"{counts.rows_observed} of {len(niches)}",
+        "archive": str(command.out),
+    }
+    shown = console.console()
+    shown.print(console.facts(rows))
+    if command.elite is None:
+        shown.print(
+            "The log does not say whose children births are: all count as unrelated, and what follows "
+            "may seem surer than it is."
+        )
+    return 0
+
+
+def _words(text: str | None) -> tuple[str, ...]:
+    return () if text is None else tuple(part.strip() for part in text.split(","))

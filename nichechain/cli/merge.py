@@ -1,0 +1,44 @@
+"""``nichechain merge``: archives of several runs as one."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from nichechain.cli import console
+
+
+@dataclass(frozen=True)
+class Merge:
+    """Make one archive of several of one domain, niches and mutation: counts add, the largest key wins."""
+
+    paths: Annotated[tuple[str, ...], tyro.conf.Positional, tyro.conf.arg(metavar="PATH")]
+    """Archive folders, at least two."""
+    out: Annotated[Path, tyro.conf.arg(metavar="PATH")]
+    """Archive folder to make. No build can go on with it."""
+
+
+def run(arguments: Sequence[str]) -> int:
+    """Merge."""
+    command = console.parse(Merge, arguments)
+    from nichechain.archive import load
+    from nichechain.merging import merge
+
+    merge([load(path).folder for path in command.paths], command.out)
+    archive = load(command.out)
+    counts = archive.counts
+    niches = len(archive.niches)
+    assert archive.meta.origin is not None
+    rows = {
+        "runs": str(len(archive.meta.origin["runs"])),
+        "births": str(archive.meta.births),
+        "niches filled": f"{archive.filled} of {niches}",
+        "rows of T observed": f"{counts.rows_observed} of {niches}",
+        "archive": str(command.out),
+    }
+    console.console().print(console.facts(rows))
+    return 0

@@ -1,0 +1,142 @@
+"""Archives of several runs of one search as one archive."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+
+from nichechain import store
+from nichechain.births import Offspring
+from nichechain.errors import ArchiveError, NichechainError
+from nichechain.illumination import Elites, SearchState
+
+# What archives must have in common: what T is about, and what makes a birth an elite.
+_SHARED = ("domain", "domain_seed", "shape", "bounds", "outside", "mutation", "scale", "replacement")
+
+
+def merge(folders: Sequence[str | Path], out: str | Path) -> None:
+    """Make one archive of several.
+
+    Births are put one after the other, runs and births numbered on, so that counts add. The elite of
+    a niche is the birth with the largest key, as if one search had met them all; the birth
+    of the earlier run stays where keys are equal. What was pending is dropped: no build goes on
+    with the result.
+
+    Parameters
+    ----------
+    folders : sequence of paths
+        At least two archives of the same domain, niches, mutation and replacement. They may be
+        merged themselves.
+    out : path
+        Where the result goes; it must not hold an archive.
+
+    Raises
+    ------
+    NichechainError
+        If there are fewer than two archives, or they do not belong together.
+    ArchiveError
+        If a folder is no archive, or ``out`` is one.
+
+    Notes
+    -----
+    ``meta.origin["runs"]`` has, for every run of the result, its configuration, its number of
+    births and the uid of its first: the uid that a birth had in its own run is what lies above.
+    """
+    paths, out = [Path(folder) for folder in folders], Path(out)
+    if len(paths) < 2:
+        raise NichechainError(f"{len(paths)} archive cannot be merged: give at least two")
+    metas = [store.read_meta(path) for path in paths]
+    runs = _runs(paths, metas)
+    # Checked before anything is read at length.
+    if store.is_archive(out):
+        raise ArchiveError(f"{out} already holds an archive: merge into another folder")
+    tables, elites = [], []
+    first_run = first_uid = 0
+    for path, meta in zip(paths, metas, strict=True):
+        tables.append(_renumbered(store.read_births(path, meta), first_run, first_uid))
+        own = store.read_state(path, meta).elites
+        elites.append(replace(own, uid=own.uid + first_uid))
+        first_run += len(meta.origin["runs"]) if meta.origin is not None else 1
+        first_uid += meta.births
+    births = pa.concat_tables(tables)
+    config = replace(metas[0].config, evaluations=len(births))
+    none = np.empty(0, np.int64)
+    length = elites[0].genotype.shape[1]
+    pending = Offspring(np.empty((0, length), np.float32), none, none, none, none)
+    state = SearchState(_largest(elites), pending, len(births), max(meta.step for meta in metas))
+    with store.writing(out):
+        if store.is_archive(out):
+            raise ArchiveError(f"{out} already holds an archive: merge into another folder")
+        writer = store.Writer(out, config, metas[0].facts, {"kind": "merged", "runs": runs})
+        writer.append(births)
+        writer.commit(state)
+
+
+def _runs(paths: list[Path], metas: list[store.Meta]) -> list[dict[str, Any]]:
+    """One entry per run of the result, after checking that the archives belong together."""
+    runs: list[dict[str, Any]] = []
+    owner: list[Path] = []
+    for path, meta in zip(paths, metas, strict=True):
+        if meta.imported:
+            raise NichechainError(
+                f"{path} was imported: import both logs as one, with a column of runs, instead"
+            )
+        for name in _SHARED:
+            ours, theirs = getattr(metas[0].config, name), getattr(meta.config, name)
+            if ours != theirs:
+                raise NichechainError(
+                    f"{paths[0]} has {name} {ours} and {path} has {theirs}, but must have the same"
+                )
+        first = sum(run["births"] for run in runs)
+        if meta.origin is None:
+            own: list[dict[str, Any]] = [
+                {"config": meta.config.to_json(), "births": meta.births, "first_uid": 0}
+            ]
+        else:
+            own = meta.origin["runs"]
+        for run in own:
+            for other, whose in zip(runs, owner, strict=True):
+                if _same_search(run["config"], other["config"]):
+                    raise NichechainError(
+                        f"{whose} and {path} both have the run of seed {run['config']['seed']}, "
+                        "whose births would count twice"
+                    )
+        for run in own:
+            runs.append({**run, "first_uid": first + run["first_uid"]})
+            owner.append(path)
+    return runs
+
+
+def _same_search(first: dict[str, Any], second: dict[str, Any]) -> bool:
+    """Whether two configurations differ in nothing but how far they go."""
+    # A configuration that was stored has lists where a new one has tuples.
+    return all(_listed(first[name]) == _listed(second[name]) for name in first if name != "evaluations")
+
+
+def _listed(value: Any) -> Any:
+    return [_listed(part) for part in value] if isinstance(value, (list, tuple)) else value
+
+
+def _renumbered(births: pa.Table, first_run: int, first_uid: int) -> pa.Table:
+    """Births with the numbers of their runs, themselves and their parents moved on."""
+    for name, by in (("run", first_run), ("uid", first_uid), ("parent_uid", first_uid)):
+        kind = births.schema.field(name)
+        moved = pc.add(births[name], pa.scalar(by, kind.type))
+        births = births.set_column(births.schema.get_field_index(name), kind, moved)
+    return births
+
+
+def _largest(elites: list[Elites]) -> Elites:
+    """Of every state, the elite with the largest key; of equal keys that with the smallest uid."""
+    pooled = elites[0]
+    for more in elites[1:]:
+        pooled = Elites.concatenate(pooled, more)
+    pooled = pooled[np.lexsort((pooled.uid, -pooled.key, pooled.niche))]
+    _, first = np.unique(pooled.niche, return_index=True)
+    return pooled[first]
