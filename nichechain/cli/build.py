@@ -44,8 +44,8 @@ class Build:
     """Seed of the run."""
     domain_seed: int = BuildConfig.domain_seed
     """Seed of what the domain holds fixed (fetch: where block and target begin)."""
-    workers: Annotated[int | None, console.option("INT", "one per processor")] = None
-    """Threads. They do not change the result."""
+    workers: Annotated[str | None, console.option("WORKERS", "one thread per processor")] = None
+    """Who evaluates: a number of threads, processes:N, ray or ray://HOST:PORT. The result is the same."""
     out: Annotated[Path | None, console.option("PATH", "archives/DOMAIN-seedSEED")] = None
     """Archive folder."""
     resume: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
@@ -112,9 +112,8 @@ class Build:
 def run(arguments: Sequence[str]) -> int:
     """Build, then say what came of it."""
     command = console.parse(Build, arguments)
-    from nichechain import store
+    from nichechain import execution, store
     from nichechain.building import build
-    from nichechain.execution import Threads
 
     command.config()
     folder = command.folder
@@ -131,7 +130,7 @@ def run(arguments: Sequence[str]) -> int:
         command = console.parse(Build, arguments, default=Build.of(stored.config))
     config = command.config()
     shown = console.console()
-    with Threads(command.workers) as threads:
+    with execution.make(command.workers) as executor:
         if command.force and folder.exists():
             with store.writing(folder):
                 store.clear(folder)
@@ -144,7 +143,7 @@ def run(arguments: Sequence[str]) -> int:
             domain.evaluate(domain.sample(1, seed=0))
         try:
             with console.build_progress(config.evaluations) as tell:
-                build(config, folder, threads, domain=domain, on_progress=tell)
+                build(config, folder, executor, domain=domain, on_progress=tell)
         except KeyboardInterrupt:
             kept = store.read_meta(folder).births if store.is_archive(folder) else 0
             again = f"nichechain build {config.domain} --out {folder} --resume"

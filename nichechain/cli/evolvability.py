@@ -56,8 +56,8 @@ class Evolvability:
     """Simulations, for --method monte-carlo."""
     seed: int = 0
     """Seed of draws, simulations and offspring."""
-    workers: Annotated[int | None, console.option("INT", "one per processor")] = None
-    """Threads for an elite's offspring."""
+    workers: Annotated[str | None, console.option("WORKERS", "one thread per processor")] = None
+    """Who evaluates an elite's offspring: a number of threads, processes:N, ray or ray://HOST:PORT."""
     format: Literal["table", "csv", "json"] = "table"
     """How to write it."""
 
@@ -99,8 +99,8 @@ def _one(command: Evolvability, archive: Archive, chain: NicheChain) -> pd.DataF
     """One row, for a niche or the genotype of its elite."""
     import pandas as pd
 
+    from nichechain import execution
     from nichechain.evolvability import genotype_evolvability, l_evolvability
-    from nichechain.execution import Threads
     from nichechain.niches import parse_niche
 
     if command.niche is not None:
@@ -121,7 +121,7 @@ def _one(command: Evolvability, archive: Archive, chain: NicheChain) -> pd.DataF
         assert command.elite is not None
         elite = archive.elite(parse_niche(command.elite, "--elite"))
         state = elite.state
-        with Threads(command.workers) as threads, console.spinner("evaluating the elite's offspring"):
+        with execution.make(command.workers) as executor, console.spinner("evaluating the elite's offspring"):
             result = genotype_evolvability(
                 archive,
                 elite,
@@ -134,7 +134,7 @@ def _one(command: Evolvability, archive: Archive, chain: NicheChain) -> pd.DataF
                 repeats=command.repeats,
                 draws=command.draws,
                 seed=command.seed,
-                executor=threads,
+                executor=executor,
             )
     values = {name: value for name, value in asdict(result).items() if value is not None}
     root = {"niche": state, "index": archive.niches.label(state)}

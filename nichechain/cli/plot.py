@@ -19,6 +19,10 @@ if TYPE_CHECKING:
 
 FORMATS = (".png", ".svg", ".pdf")
 
+# Figures of two pictures, and their sizes in inches.
+_PAIRS = {"uncertainty": (14.0, 7.4), "growth": (12.0, 5.6)}
+_FEW_DRAWS = 5
+
 
 @dataclass(frozen=True)
 class Plot:
@@ -27,19 +31,38 @@ class Plot:
     path: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="PATH")]
     """Archive folder, or the name of an archive that ships with nichechain."""
     kind: Annotated[
-        Literal["elites", "visits", "evolvability", "transitions", "reachability"], tyro.conf.Positional
+        Literal[
+            "elites",
+            "visits",
+            "evolvability",
+            "uncertainty",
+            "growth",
+            "reach",
+            "reachability",
+            "wormholes",
+            "classes",
+            "transitions",
+            "transitions-by-class",
+        ],
+        tyro.conf.Positional,
     ]
-    """What to draw; reachability is the graph of which niches lead to which."""
+    """What to draw. Maps of niches: elites, visits (births), evolvability, uncertainty (with its interval
+    beside it), reach (where descendants of --niche go), classes (communicating ones, of observed
+    transitions). Graphs: reachability (which niches lead to which), wormholes. Curves against l and U:
+    growth. Matrices: transitions, transitions-by-class."""
     out: Annotated[Path | None, console.option("FILE", "KIND.png")] = None
     """Picture to write: .png, .svg or .pdf."""
     l: int = 5  # noqa: E741  # the paper's name
-    """Generations, for evolvability."""
+    """Generations, for evolvability and reach."""
     lineages: int = 100
-    """Lineages, for evolvability."""
-    threshold: float = 0.05
-    """Smallest probability that gets an arrow, for reachability."""
+    """Lineages, for evolvability and reach."""
+    niche: Annotated[str | None, console.option("I,J", "for growth the best, the middle and the last")] = None
+    """Niche whose descendants reach shows, or growth counts."""
+    threshold: Annotated[float | None, console.option("FLOAT", "0.05, for classes 0")] = None
+    """Probability that a transition needs for an arrow, for reachability, or must exceed to count, for
+    classes and transitions-by-class."""
     estimator: Literal["empirical-bayes", "dirichlet", "mle"] = "empirical-bayes"
-    """How T is estimated."""
+    """How T is estimated; classes are always those of mle, as a posterior has no zeros."""
     min_births: int = 20
     """Niches with fewer births behind their row of T are crossed out, for evolvability."""
     dpi: int = 200
@@ -58,15 +81,56 @@ def run(arguments: Sequence[str]) -> int:
         raise NichechainError(f"--dpi is {command.dpi}, but must be between 10 and 2000")
     from nichechain.archive import load
 
+    if command.kind == "reach" and command.niche is None:
+        raise NichechainError("--niche is missing, but reach is drawn from a niche, such as --niche 7,11")
+    if command.niche is not None and command.kind not in ("reach", "growth"):
+        raise NichechainError(f"--niche belongs to reach and growth, not to {command.kind}")
     archive = load(command.path)
     # A figure made directly, not through pyplot, needs no display and leaves no state behind.
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(7.0, 7.4))
-    _draw(command, archive, figure.add_subplot())
+    pair = command.kind in _PAIRS
+    figure = Figure(figsize=_PAIRS[command.kind] if pair else (7.0, 7.4))
+    if pair:
+        left, right = figure.subplots(
+            1, 2, gridspec_kw={"wspace": 0.45 if command.kind == "uncertainty" else 0.2}
+        )
+        _draw_pair(command, archive, left, right)
+    else:
+        _draw(command, archive, figure.add_subplot())
     figure.savefig(out, dpi=command.dpi, bbox_inches="tight", pad_inches=0.15)
     console.console().print(f"wrote {out}")
     return 0
+
+
+def _draw_pair(command: Plot, archive: Archive, left: Axes, right: Axes) -> None:
+    from nichechain.evolvability import niche_evolvability
+
+    chain = archive.chain(command.estimator)
+    if command.kind == "uncertainty":
+        from nichechain.plots import plot_evolvability
+        from nichechain.plots.uncertainty import plot_uncertainty
+
+        scores = niche_evolvability(chain, l=command.l, lineages=command.lineages)
+        plot_evolvability(archive, scores, left, min_births=command.min_births)
+        plot_uncertainty(archive, scores, right)
+        return
+    from nichechain.niches import parse_niche
+    from nichechain.plots.growth import plot_generations, plot_lineages
+
+    if command.niche is not None:
+        niches = [chain.state(parse_niche(command.niche, "--niche"))]
+    else:
+        # A few draws tell the best from the last.
+        scores = niche_evolvability(chain, l=command.l, lineages=command.lineages, draws=_FEW_DRAWS)
+        ranking = scores.ranking(chain, min_births=command.min_births)["niche"]
+        if ranking.empty:
+            raise NichechainError(f"no niche has {command.min_births} births: choose one with --niche")
+        places = sorted({0, len(ranking) // 2, len(ranking) - 1})
+        niches = [int(ranking.iloc[place]) for place in places]
+    plot_generations(chain, left, niches=niches, lineages=command.lineages)
+    plot_lineages(chain, right, niches=niches, l=command.l)
+    left.figure.suptitle(chain.estimator, fontsize="small", color="#555555")
 
 
 def _draw(command: Plot, archive: Archive, ax: Axes) -> None:
@@ -86,6 +150,29 @@ def _draw(command: Plot, archive: Archive, ax: Axes) -> None:
         case "transitions":
             plots.plot_transitions(archive, archive.chain(command.estimator), ax)
         case "reachability":
-            plots.plot_reachability(
-                archive, archive.chain(command.estimator), ax, threshold=command.threshold
-            )
+            threshold = 0.05 if command.threshold is None else command.threshold
+            plots.plot_reachability(archive, archive.chain(command.estimator), ax, threshold=threshold)
+        case "reach":
+            from nichechain.niches import parse_niche
+            from nichechain.plots.reach import plot_reach
+            from nichechain.reach import reach
+
+            assert command.niche is not None
+            chain = archive.chain(command.estimator)
+            niche = chain.state(parse_niche(command.niche, "--niche"))
+            found = reach(chain, niche=niche, l=command.l, lineages=command.lineages)
+            plot_reach(archive, found, ax, niche=niche)
+        case "wormholes":
+            from nichechain.chain.wormholes import wormholes
+            from nichechain.plots.wormholes import plot_wormholes
+
+            # Broken children all land at the start, which is no secret passage.
+            plot_wormholes(archive, wormholes(archive.chain(command.estimator), beyond="both"), ax)
+        case "classes":
+            from nichechain.plots.classes import plot_classes
+
+            plot_classes(archive, archive.chain("mle"), ax, threshold=command.threshold or 0.0)
+        case "transitions-by-class":
+            from nichechain.plots.classes import plot_transitions_by_class
+
+            plot_transitions_by_class(archive, archive.chain("mle"), ax, threshold=command.threshold or 0.0)

@@ -39,8 +39,8 @@ class Validate:
     """Permutations of each test."""
     seed: int = 0
     """Seed of the choice of elites, of their lineages, of permutations and of draws."""
-    workers: Annotated[int | None, console.option("INT", "one per processor")] = None
-    """Threads. They do not change the result."""
+    workers: Annotated[str | None, console.option("WORKERS", "one thread per processor")] = None
+    """Who evaluates: a number of threads, processes:N, ray or ray://HOST:PORT. The result is the same."""
     out: Annotated[Path | None, console.option("DIR", "NAME-validation")] = None
     """Folder for validation.json, calibration.png and lineages.csv."""
 
@@ -48,8 +48,8 @@ class Validate:
 def run(arguments: Sequence[str]) -> int:
     """Validate."""
     command = console.parse(Validate, arguments)
+    from nichechain import execution
     from nichechain.archive import load
-    from nichechain.execution import Threads
     from nichechain.validation import ValidationConfig, validate
 
     config = ValidationConfig(
@@ -63,8 +63,8 @@ def run(arguments: Sequence[str]) -> int:
     out = command.out or Path(f"{archive.folder.name}-validation")
     if out.exists() and not out.is_dir():
         raise NichechainError(f"--out is {str(out)!r}, but that is a file, not a folder")
-    with Threads(command.workers) as threads, _progress(config.evaluations) as tell:
-        result = validate(archive, threads, config, on_done=tell)
+    with execution.make(command.workers) as executor, _progress(config.evaluations) as tell:
+        result = validate(archive, executor, config, on_done=tell)
     # Made only now, so that bad input leaves nothing behind.
     out.mkdir(parents=True, exist_ok=True)
     (out / "validation.json").write_text(json.dumps(result.to_json(), indent=2) + "\n", encoding="utf-8")

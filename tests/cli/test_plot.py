@@ -3,13 +3,26 @@ import pytest
 
 from nichechain.cli import main
 
-KINDS = ["elites", "visits", "evolvability", "transitions", "reachability"]
+KINDS = [
+    "elites",
+    "visits",
+    "evolvability",
+    "uncertainty",
+    "growth",
+    "reach",
+    "reachability",
+    "wormholes",
+    "classes",
+    "transitions",
+    "transitions-by-class",
+]
 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_every_kind_writes_a_picture(built, tmp_path, capsys, kind):
     out = tmp_path / f"{kind}.png"
-    assert main(["plot", str(built), kind, "--out", str(out), "--dpi", "60"]) == 0
+    options = ["--niche", "5,4"] if kind == "reach" else []
+    assert main(["plot", str(built), kind, "--out", str(out), "--dpi", "60", *options]) == 0
     assert f"wrote {out}" in capsys.readouterr().out.replace("\n", "")
     picture = matplotlib.image.imread(out)
     assert min(picture.shape[:2]) > 300
@@ -32,6 +45,14 @@ def test_vector_formats(built, tmp_path, suffix, magic):
         (["visits", "--dpi", "1"], "--dpi is 1"),
         (["reachability", "--threshold", "1.5"], "threshold is 1.5"),
         (["evolvability", "--l", "0"], "l is 0"),
+        (["uncertainty", "--estimator", "mle"], "leaves no interval to draw"),
+        (["reach"], "--niche is missing"),
+        (["reach", "--niche", "9,0"], "niche is 9,0, but this grid runs from 0,0 to 7,7"),
+        (["reach", "--niche", "a"], "--niche is 'a'"),
+        (["visits", "--niche", "1,1"], "--niche belongs to reach and growth, not to visits"),
+        (["growth", "--min-births", "9999"], "no niche has 9999 births"),
+        (["classes", "--threshold", "1"], "threshold is 1"),
+        (["wormholes", "--estimator", "mle"], "need a chain with a posterior"),
     ],
 )
 def test_bad_options_write_nothing(built, tmp_path, monkeypatch, capsys, options, said):

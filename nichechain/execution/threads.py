@@ -1,31 +1,16 @@
-"""Where evaluations run. Results never depend on it."""
+"""Threads of this process: for domains whose rollouts leave the GIL."""
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from types import TracebackType
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from nichechain.domains.base import Domain, Evaluation
-from nichechain.errors import NichechainError
-
-
-class Executor(Protocol):
-    """Evaluates batches of genotypes somewhere."""
-
-    def evaluate(
-        self,
-        domain: Domain,
-        genotypes: NDArray[np.float32],
-        on_done: Callable[[int], None] | None = None,
-    ) -> Evaluation:
-        """The rows of ``domain.evaluate(genotypes)``, in order, to the bit."""
-        ...
+from nichechain.execution.base import count_workers, evaluate_rows
 
 
 class Threads:
@@ -45,10 +30,7 @@ class Threads:
     """
 
     def __init__(self, workers: int | None = None) -> None:
-        count = available_cpus() if workers is None else workers
-        if count < 1:
-            raise NichechainError(f"workers is {count}, but at least 1 is needed")
-        self._pool = ThreadPoolExecutor(count, thread_name_prefix="nichechain")
+        self._pool = ThreadPoolExecutor(count_workers(workers), thread_name_prefix="nichechain")
 
     def evaluate(
         self,
@@ -57,8 +39,11 @@ class Threads:
         on_done: Callable[[int], None] | None = None,
     ) -> Evaluation:
         """Evaluate genotypes (N, P), N at least 1, telling ``on_done`` of every finished chunk's size."""
-        chunks = [genotypes[i : i + domain.chunk] for i in range(0, len(genotypes), domain.chunk)]
-        futures = [self._pool.submit(domain.evaluate, chunk) for chunk in chunks]
+        # Chunks are views, so a long queue of them costs next to nothing.
+        futures = [
+            self._pool.submit(evaluate_rows, domain, genotypes[first : first + domain.chunk], first)
+            for first in range(0, len(genotypes), domain.chunk)
+        ]
         try:
             parts = []
             for future in futures:
@@ -85,10 +70,3 @@ class Threads:
         trace: TracebackType | None,
     ) -> None:
         self.close()
-
-
-def available_cpus() -> int:
-    """Processors that this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1

@@ -1,0 +1,51 @@
+"""Where evaluations run: threads, processes or a Ray cluster. Results never depend on it."""
+
+from __future__ import annotations
+
+from contextlib import AbstractContextManager
+
+from nichechain.errors import NichechainError
+from nichechain.execution.base import Executor, available_cpus
+from nichechain.execution.processes import Processes
+from nichechain.execution.ray import Ray
+from nichechain.execution.threads import Threads
+
+__all__ = ["Executor", "Processes", "Ray", "Threads", "available_cpus", "make"]
+
+
+def make(workers: str | None = None) -> AbstractContextManager[Executor]:
+    """The executor of that description, as the command line knows it.
+
+    Parameters
+    ----------
+    workers : str, optional
+        ``4`` or ``threads:4``, ``processes:4``, ``ray`` or ``ray://host:port``; without a number,
+        one worker per processor. By default ``threads``.
+
+    Returns
+    -------
+    context manager of an Executor
+        Leaving it ends the workers.
+
+    Raises
+    ------
+    NichechainError
+        If there is no such executor, or Ray is asked for and is not installed or does not answer.
+    """
+    kind, _, rest = (workers or "threads").partition(":")
+    if not rest and _is_number(kind):
+        kind, rest = "threads", kind
+    if kind == "ray" and workers == "ray":
+        return Ray()
+    if kind == "ray" and rest.startswith("//") and len(rest) > 2:
+        return Ray(workers)
+    if kind in ("threads", "processes") and (workers in (None, kind) or _is_number(rest)):
+        count = int(rest) if rest else None
+        return Threads(count) if kind == "threads" else Processes(count)
+    raise NichechainError(
+        f"workers is {workers!r}, but must be a number of threads, threads:N, processes:N, ray or ray://HOST:PORT"
+    )
+
+
+def _is_number(text: str) -> bool:
+    return text.removeprefix("-").isdecimal() and text.isascii()

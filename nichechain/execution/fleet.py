@@ -1,0 +1,271 @@
+"""Workers outside this process, any of which may be lost: the loop that keeps them busy."""
+
+from __future__ import annotations
+
+import pickle
+import traceback
+from abc import ABC, abstractmethod
+from collections import deque
+from collections.abc import Callable
+from concurrent.futures import Future
+from dataclasses import dataclass
+from queue import Empty, SimpleQueue
+from types import TracebackType
+from typing import NoReturn, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nichechain.domains.base import Domain, Evaluation
+from nichechain.errors import NichechainError
+from nichechain.execution.base import evaluate_rows
+from nichechain.execution.pieces import LOSSES, Piece, Pieces
+
+_AHEAD = 2
+"""Pieces with a worker at a time: one under way, and the next, so that it never waits for us."""
+
+_PATIENCE = 300.0
+"""Seconds without any worker, after which none is expected any more."""
+
+
+@dataclass(frozen=True)
+class Raised:
+    """An exception on its way from a worker to the caller, where it will be raised again."""
+
+    error: Exception
+    trace: str
+
+    @staticmethod
+    def of(error: Exception) -> Raised:
+        """The exception as something that surely can be sent."""
+        trace = "".join(traceback.format_exception(error))
+        try:
+            # Not every exception that can be pickled can be made again from its pickle.
+            pickle.loads(pickle.dumps(error))  # noqa: S301  # our own, a moment old
+        except Exception:
+            plain = RuntimeError(f"{type(error).__name__}: {error}")
+            for note in getattr(error, "__notes__", ()):
+                plain.add_note(note)
+            return Raised(plain, trace)
+        return Raised(error, trace)
+
+    def again(self) -> NoReturn:
+        """Raise it here, with a note of where it came from."""
+        self.error.add_note(f"in a worker:\n{self.trace}")
+        raise self.error
+
+
+Outcome = Evaluation | Raised | None
+
+
+class Workbench:
+    """A worker's side: its copy of the domain, and evaluations on it.
+
+    Parameters
+    ----------
+    domain : bytes
+        The pickled domain.
+    """
+
+    def __init__(self, domain: bytes) -> None:
+        self._pickled = domain
+        self._domain: Domain | None = None
+
+    def prepare(self) -> Raised | None:
+        """Unpack the domain; what it raised, if it did."""
+        try:
+            self._domain = pickle.loads(self._pickled)  # noqa: S301  # from our own driver
+        except Exception as error:
+            return Raised.of(error)
+        return None
+
+    def evaluate(self, genotypes: NDArray[np.float32], first: int) -> Evaluation | Raised:
+        """Rows of a batch from row ``first`` on, or what one of them raised."""
+        if self._domain is None and (raised := self.prepare()) is not None:
+            return raised
+        assert self._domain is not None
+        try:
+            # A copy, for Ray's arrays are read-only, which a domain need not expect.
+            return evaluate_rows(self._domain, genotypes.copy(), first)
+        except Exception as error:
+            return Raised.of(error)
+
+
+class Worker(ABC):
+    """A worker as its fleet sees it; it does what it is sent in order.
+
+    Attributes
+    ----------
+    ready : Future
+        Done when the worker has the domain.
+    """
+
+    ready: Future[Outcome]
+
+    @abstractmethod
+    def submit(self, genotypes: NDArray[np.float32], first: int) -> Future[Outcome]:
+        """Send rows of a batch, from row ``first`` on."""
+
+    @abstractmethod
+    def stop(self, *, kill: bool) -> None:
+        """End the worker: kill it, whatever it is at, or let it leave if it is idle."""
+
+
+class Fleet(ABC):
+    """An executor whose workers may be lost; their rows are evaluated elsewhere.
+
+    A lost worker is replaced. The domain travels to each worker once.
+    """
+
+    _lost: tuple[type[BaseException], ...]
+    """What a worker's futures raise when it is no more."""
+
+    def __init__(self) -> None:
+        self._crew: list[Worker] = []
+        self._domain: Domain | None = None
+
+    @abstractmethod
+    def _size(self) -> int:
+        """How many workers there should be now."""
+
+    @abstractmethod
+    def _send(self, domain: bytes) -> None:
+        """Take a pickled domain for the workers hired from now on."""
+
+    @abstractmethod
+    def _hire(self) -> Worker:
+        """A new worker, on its way to being ready."""
+
+    def evaluate(
+        self,
+        domain: Domain,
+        genotypes: NDArray[np.float32],
+        on_done: Callable[[int], None] | None = None,
+    ) -> Evaluation:
+        """Evaluate genotypes (N, P), N at least 1, telling ``on_done`` of every finished piece's size.
+
+        Raises
+        ------
+        NichechainError
+            If the same rows cost several workers, or no worker can be had.
+        """
+        try:
+            if domain is not self._domain:
+                import cloudpickle
+
+                self._dismiss(kill=False)
+                self._send(cloudpickle.dumps(domain))
+                self._domain = domain
+            size = self._size()
+            pieces = Pieces(len(genotypes), domain.chunk, size)
+            _Shift(self, pieces, genotypes, on_done).work(size)
+        except BaseException:
+            # What is still out is of no use to anybody, and an interrupt must not wait for it.
+            self._dismiss(kill=True)
+            raise
+        return pieces.evaluation()
+
+    def close(self) -> None:
+        """End the workers."""
+        self._dismiss(kill=False)
+
+    def _dismiss(self, *, kill: bool) -> None:
+        self._domain = None
+        while self._crew:
+            self._crew.pop().stop(kill=kill)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+
+class _Shift:
+    """The evaluation of one batch: who is at which pieces."""
+
+    def __init__(
+        self,
+        fleet: Fleet,
+        pieces: Pieces,
+        genotypes: NDArray[np.float32],
+        on_done: Callable[[int], None] | None,
+    ) -> None:
+        self._fleet = fleet
+        self._pieces = pieces
+        self._genotypes = genotypes
+        self._on_done = on_done
+        self._held: dict[Worker, deque[Piece]] = {}
+        self._news: SimpleQueue[tuple[Worker, Piece | None, Future[Outcome]]] = SimpleQueue()
+        self._false_starts = 0
+
+    def work(self, size: int) -> None:
+        """Until no row is left."""
+        for worker in self._fleet._crew:
+            self._watch(worker, None, worker.ready)
+        while len(self._fleet._crew) < size:
+            self._hire()
+        while self._pieces.left:
+            try:
+                worker, piece, future = self._news.get(timeout=None if self._held else _PATIENCE)
+            except Empty:
+                raise NichechainError(
+                    f"no worker could be started within {_PATIENCE:.0f} s: are there free processors?"
+                ) from None
+            if worker not in self._fleet._crew:
+                continue
+            try:
+                outcome = future.result()
+            except self._fleet._lost as error:
+                self._replace(worker, error)
+                continue
+            if isinstance(outcome, Raised):
+                outcome.again()
+            if piece is None:
+                self._false_starts = 0
+                self._held[worker] = deque()
+            else:
+                assert outcome is not None
+                self._held[worker].remove(piece)
+                self._pieces.finish(piece, outcome)
+                if self._on_done is not None:
+                    self._on_done(len(piece))
+            self._supply(worker)
+
+    def _watch(self, worker: Worker, piece: Piece | None, future: Future[Outcome]) -> None:
+        future.add_done_callback(lambda done: self._news.put((worker, piece, done)))
+
+    def _hire(self) -> None:
+        worker = self._fleet._hire()
+        self._fleet._crew.append(worker)
+        self._watch(worker, None, worker.ready)
+
+    def _supply(self, worker: Worker) -> None:
+        held = self._held[worker]
+        while len(held) < _AHEAD and (piece := self._pieces.take()) is not None:
+            held.append(piece)
+            future = worker.submit(self._genotypes[piece.start : piece.stop], piece.start)
+            self._watch(worker, piece, future)
+
+    def _replace(self, worker: Worker, error: BaseException) -> None:
+        """Hire for a lost worker, and give its pieces to the others."""
+        self._fleet._crew.remove(worker)
+        worker.stop(kill=True)
+        held = self._held.pop(worker, None)
+        if held is None:
+            self._false_starts += 1
+            if self._false_starts == LOSSES:
+                raise NichechainError(f"{LOSSES} workers in a row died as they started: {error}") from error
+        elif held:
+            # It worked in order, so it was at the first; the others only waited.
+            self._pieces.lose(held.popleft())
+            for piece in held:
+                self._pieces.put_back(piece)
+        self._hire()
+        for other in self._held:
+            self._supply(other)

@@ -1,0 +1,103 @@
+"""Processes of this machine: for domains that hold the GIL, or that may crash."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+import time
+from concurrent.futures import Future
+from concurrent.futures.process import BrokenProcessPool
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nichechain.execution.base import count_workers
+from nichechain.execution.fleet import Fleet, Outcome, Raised, Workbench, Worker
+
+if TYPE_CHECKING:
+    from nichechain.domains.base import Evaluation
+
+
+class Processes(Fleet):
+    """Evaluates in processes of this machine.
+
+    Right for domains that run in Python, and hold the GIL. A process that dies is replaced and
+    its rows are evaluated again; what the domain defines may live in a script or a notebook.
+
+    Parameters
+    ----------
+    workers : int
+        Number of processes, at least 1; by default the processors this process may use.
+
+    Raises
+    ------
+    NichechainError
+        If ``workers`` is below 1.
+    """
+
+    _lost = (BrokenProcessPool,)
+
+    def __init__(self, workers: int | None = None) -> None:
+        super().__init__()
+        self._count = count_workers(workers)
+        self._pickled = b""
+
+    def _size(self) -> int:
+        return self._count
+
+    def _send(self, domain: bytes) -> None:
+        self._pickled = domain
+
+    def _hire(self) -> Worker:
+        return _Process(self._pickled)
+
+
+class _Process(Worker):
+    """A pool of one: when it breaks, we know over which rows, and the others go on."""
+
+    def __init__(self, domain: bytes) -> None:
+        from loky import ProcessPoolExecutor
+
+        # As many numerical threads in each process as processors would be too many.
+        env = {"OMP_NUM_THREADS": os.environ.get("OMP_NUM_THREADS", "1")}
+        self._pool: Any = ProcessPoolExecutor(1, initializer=_begin, initargs=(domain, os.getpid()), env=env)
+        self.ready = self._pool.submit(_prepare)
+
+    def submit(self, genotypes: NDArray[np.float32], first: int) -> Future[Outcome]:
+        try:
+            future: Future[Outcome] = self._pool.submit(_evaluate, genotypes, first)
+        except BrokenProcessPool as error:
+            future = Future()
+            future.set_exception(error)
+        return future
+
+    def stop(self, *, kill: bool) -> None:
+        self._pool.shutdown(wait=True, kill_workers=kill)
+
+
+# A process of a pool has nowhere else to keep something between two tasks.
+_bench: list[Workbench] = []
+
+
+def _begin(domain: bytes, parent: int) -> None:
+    # Ctrl-C reaches all processes of a terminal; what it means is for the parent to say.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
+    _bench[:] = [Workbench(domain)]
+
+
+def _end_with(parent: int) -> None:
+    """Leave when the parent has: it may have been killed, and told nobody."""
+    while os.getppid() == parent:
+        time.sleep(1.0)
+    os._exit(1)
+
+
+def _prepare() -> Raised | None:
+    return _bench[0].prepare()
+
+
+def _evaluate(genotypes: NDArray[np.float32], first: int) -> Evaluation | Raised:
+    return _bench[0].evaluate(genotypes, first)

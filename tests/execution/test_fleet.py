@@ -1,0 +1,142 @@
+"""The loop that keeps workers busy, with workers that are lost when we say so."""
+
+from __future__ import annotations
+
+import random
+import threading
+from concurrent.futures import Future, ThreadPoolExecutor
+
+import numpy as np
+import pytest
+
+from nichechain.errors import NichechainError
+from nichechain.execution import fleet
+from nichechain.execution.fleet import Fleet, Outcome, Workbench, Worker
+
+from .samples import Arm, assert_same, numbered
+
+
+class Lost(Exception):  # noqa: N818
+    """A worker is no more."""
+
+
+class FakeFleet(Fleet):
+    """Threads that behave like workers far away: slow, mortal, and counted."""
+
+    _lost = (Lost,)
+
+    def __init__(self, size: int, mortality: float = 0.0, seed: int = 0, ready: bool = True) -> None:
+        super().__init__()
+        self.size, self.mortality, self.is_ready = size, mortality, ready
+        self.dice = random.Random(seed)
+        self.hired = self.deaths = self.most_out = 0
+        self.sent = b""
+
+    def _size(self) -> int:
+        return self.size
+
+    def _send(self, domain: bytes) -> None:
+        self.sent = domain
+
+    def _hire(self) -> Worker:
+        self.hired += 1
+        return FakeWorker(self)
+
+
+class FakeWorker(Worker):
+    def __init__(self, fleet: FakeFleet) -> None:
+        self.fleet = fleet
+        self.bench = Workbench(fleet.sent)
+        self.pool = ThreadPoolExecutor(1)
+        self.out = 0
+        self.lock = threading.Lock()
+        self.dead = False
+        self.ready: Future[Outcome] = self.pool.submit(self.bench.prepare) if fleet.is_ready else Future()
+
+    def submit(self, genotypes: np.ndarray, first: int) -> Future[Outcome]:
+        with self.lock:
+            self.out += 1
+            self.fleet.most_out = max(self.fleet.most_out, self.out)
+        return self.pool.submit(self.work, genotypes, first)
+
+    def work(self, genotypes: np.ndarray, first: int) -> Outcome:
+        if self.dead or self.fleet.dice.random() < self.fleet.mortality:
+            self.fleet.deaths += not self.dead
+            self.dead = True
+            raise Lost
+        with self.lock:
+            self.out -= 1
+        return self.bench.evaluate(genotypes, first)
+
+    def stop(self, *, kill: bool) -> None:
+        self.pool.shutdown(wait=not kill)
+
+
+@pytest.mark.parametrize("size", [1, 2, 7])
+@pytest.mark.parametrize("n", [1, 5, 256])
+def test_rows_come_in_order(size: int, n: int) -> None:
+    done: list[int] = []
+    with FakeFleet(size) as executor:
+        assert_same(executor.evaluate(Arm(), numbered(n), done.append), Arm().evaluate(numbered(n)))
+    assert sum(done) == n
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_lost_workers_change_nothing(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    # Rows are unlucky here, not deadly: none must be taken for a cause.
+    monkeypatch.setattr("nichechain.execution.pieces.LOSSES", 1000)
+    done: list[int] = []
+    with FakeFleet(3, mortality=0.3, seed=seed) as executor:
+        assert_same(executor.evaluate(Arm(), numbered(400), done.append), Arm().evaluate(numbered(400)))
+        assert executor.deaths > 3
+        # Each of the dead was replaced, and nobody else was hired.
+        assert executor.hired == 3 + executor.deaths
+        assert len(executor._crew) == 3
+    assert sum(done) == 400
+
+
+def test_few_pieces_are_out_at_a_time() -> None:
+    with FakeFleet(3) as executor:
+        executor.evaluate(Arm(), numbered(2000))
+    assert executor.most_out == 2
+
+
+def test_workers_stay_for_the_next_batch_and_go_with_their_domain() -> None:
+    domain = Arm()
+    with FakeFleet(2) as executor:
+        for _ in range(3):
+            executor.evaluate(domain, numbered(40))
+        assert executor.hired == 2
+        executor.evaluate(Arm(), numbered(40))
+        assert executor.hired == 4
+        assert len(executor._crew) == 2
+
+
+def test_the_fleet_grows_with_its_cluster() -> None:
+    domain = Arm()
+    with FakeFleet(1) as executor:
+        executor.evaluate(domain, numbered(40))
+        executor.size = 3
+        executor.evaluate(domain, numbered(40))
+        assert executor.hired == len(executor._crew) == 3
+
+
+def test_nobody_comes(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(fleet, "_PATIENCE", 0.05)
+    with (
+        FakeFleet(2, ready=False) as executor,
+        pytest.raises(NichechainError, match="no worker could be started within 0 s"),
+    ):
+        executor.evaluate(Arm(), numbered(4))
+
+
+def test_an_interrupt_lets_everybody_go() -> None:
+    def interrupt(_done: int) -> None:
+        raise KeyboardInterrupt
+
+    with FakeFleet(2) as executor:
+        domain = Arm()
+        with pytest.raises(KeyboardInterrupt):
+            executor.evaluate(domain, numbered(100), interrupt)
+        assert executor._crew == []
+        assert_same(executor.evaluate(domain, numbered(100)), domain.evaluate(numbered(100)))

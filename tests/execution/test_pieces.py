@@ -1,0 +1,86 @@
+"""Every row of a batch is evaluated, whoever is lost, and nothing is cut finer than it must be."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from nichechain.domains import PlanarArm
+from nichechain.errors import NichechainError
+from nichechain.execution.pieces import LOSSES, Piece, Pieces
+
+from .samples import assert_same, numbered
+
+
+@given(rows=st.integers(1, 400), chunk=st.integers(1, 50), workers=st.integers(1, 9), data=st.data())
+def test_every_row_once_in_any_order_and_with_any_losses(
+    rows: int, chunk: int, workers: int, data: st.DataObject
+) -> None:
+    genotypes, arm = numbered(rows), PlanarArm()
+    pieces = Pieces(rows, chunk, workers)
+    out: list[Piece] = []
+    done = 0
+    while pieces.left:
+        piece = pieces.take()
+        if piece is not None:
+            out.append(piece)
+            if data.draw(st.booleans()):
+                continue
+        piece = out.pop(data.draw(st.integers(0, len(out) - 1)))
+        fate = data.draw(st.sampled_from(["done", "returned", "lost"]))
+        if fate == "returned":
+            pieces.put_back(piece)
+        elif fate == "lost" and piece.losses < LOSSES - 1:
+            pieces.lose(piece)
+        else:
+            pieces.finish(piece, arm.evaluate(genotypes[piece.start : piece.stop]))
+            done += len(piece)
+        assert pieces.left == rows - done
+    assert done == rows
+    assert pieces.take() is None
+    assert_same(pieces.evaluation(), arm.evaluate(genotypes))
+
+
+def cut(rows: int, chunk: int, workers: int) -> list[int]:
+    pieces = Pieces(rows, chunk, workers)
+    return [len(piece) for piece in iter(pieces.take, None)]
+
+
+def test_pieces_shrink() -> None:
+    # A quarter of each worker's share of what is left, at most 16 chunks.
+    assert cut(256, 1, 2)[:9] == [16] * 9
+    assert cut(100, 1, 2)[:4] == [13, 11, 10, 9]
+    assert cut(100, 1, 2)[-8:] == [1] * 8
+    assert cut(64, 4096, 2) == [64]
+    assert cut(33, 5, 1) == [10, 10, 5, 5, 3]
+
+
+@given(st.integers(1, 2000), st.integers(1, 64), st.integers(1, 64))
+def test_pieces_are_whole_chunks_and_few(rows: int, chunk: int, workers: int) -> None:
+    sizes = cut(rows, chunk, workers)
+    assert sum(sizes) == rows
+    assert all(size % chunk == 0 for size in sizes[:-1])
+    assert sizes == sorted(sizes, reverse=True)
+    # Each piece is at least 1 / (4 workers) of the rest, or 16 chunks, or the least there is.
+    chunks = math.ceil(rows / chunk)
+    each = 4 * workers
+    assert len(sizes) <= chunks / 16 + each * (1 + math.log(max(1, chunks / each))) + 1
+
+
+def test_lost_rows_come_back_in_chunks_and_at_last_are_the_cause() -> None:
+    pieces = Pieces(64, 4, 1)
+    first = pieces.take()
+    assert first == Piece(0, 16)
+    pieces.lose(first)
+    again = [pieces.take() for _ in range(4)]
+    assert again == [Piece(start, start + 4, losses=1) for start in (0, 4, 8, 12)]
+    for losses in range(1, LOSSES - 1):
+        pieces.lose(Piece(4, 8, losses))
+        assert pieces.take() == Piece(4, 8, losses + 1)
+    with pytest.raises(NichechainError, match="one of rows 4 to 7 of the batch has cost 3 workers"):
+        pieces.lose(Piece(4, 8, LOSSES - 1))
+    with pytest.raises(NichechainError, match="evaluating row 9 of the batch has cost 3 workers"):
+        pieces.lose(Piece(9, 10, LOSSES - 1))
