@@ -131,9 +131,8 @@ def _empirical_bayes(counts: TransitionCounts, strength: float | None) -> NicheC
     posterior = DirichletPosterior(counts, BaseMeasure.pooled(counts, weights), fitted, effect)
     births = counts.births
     typical = (births * effect).sum() / max(1, births.sum())
-    return _estimated(
-        counts, posterior, f"empirical-bayes, strength {fitted:.3g}, {typical:.2g} births count as one"
-    )
+    related = f", {typical:.2g} births count as one" if typical >= 1.05 else ""
+    return _estimated(counts, posterior, f"empirical-bayes, strength {fitted:.3g}{related}")
 
 
 def _estimated(counts: TransitionCounts, posterior: DirichletPosterior, name: str) -> NicheChain:

@@ -14,6 +14,9 @@ from nichechain.config import BuildConfig, MutationName, Outside, Replacement
 from nichechain.errors import ArchiveError, NichechainError
 
 
+_MANY_NICHES = 1000
+
+
 @dataclass(frozen=True)
 class Build:
     """Fill an archive: MAP-Elites that records who was born where."""
@@ -158,14 +161,15 @@ def _report(folder: Path, shown: object) -> None:
     from rich.console import Console
 
     from nichechain.archive import load
-    from nichechain.evolvability import niche_evolvability
+    from nichechain.evolvability import DRAWS, niche_evolvability
 
     assert isinstance(shown, Console)
     archive = load(folder)
     counts = archive.counts
     chain = archive.chain()
     n = len(archive.niches)
-    scores = niche_evolvability(chain)
+    # A first look; many states take minutes with as many draws as an answer should rest on.
+    scores = niche_evolvability(chain, draws=DRAWS if n <= _MANY_NICHES else 5)
     ranking = scores.ranking(chain).head(5)
     failed = archive.meta.births - int(counts.visits.sum())
     births = archive.meta.births

@@ -1,16 +1,32 @@
-"""Figures. Every function draws on a matplotlib Axes and returns it."""
+"""Figures. Every ``plot_`` function draws on a matplotlib Axes and returns it."""
 
 from nichechain.plots.calibration import plot_calibration, plot_reached
+from nichechain.plots.classes import plot_classes, plot_transitions_by_class
+from nichechain.plots.explorer import write_explorer
+from nichechain.plots.growth import plot_generations, plot_lineages
 from nichechain.plots.maps import plot_elites, plot_evolvability, plot_visits
 from nichechain.plots.matrix import plot_transitions
+from nichechain.plots.reach import plot_reach
 from nichechain.plots.reachability import plot_reachability
+from nichechain.plots.stability import plot_stability
+from nichechain.plots.uncertainty import plot_uncertainty
+from nichechain.plots.wormholes import plot_wormholes
 
 __all__ = [
     "plot_calibration",
+    "plot_classes",
     "plot_elites",
     "plot_evolvability",
+    "plot_generations",
+    "plot_lineages",
+    "plot_reach",
     "plot_reachability",
     "plot_reached",
+    "plot_stability",
     "plot_transitions",
+    "plot_transitions_by_class",
+    "plot_uncertainty",
     "plot_visits",
+    "plot_wormholes",
+    "write_explorer",
 ]

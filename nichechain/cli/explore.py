@@ -1,0 +1,64 @@
+"""``nichechain explore``: a page on which one clicks a niche and sees where its descendants go."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Literal
+
+import tyro
+
+from nichechain.cli import console
+from nichechain.errors import NichechainError
+
+
+@dataclass(frozen=True)
+class Explore:
+    """Write a page on which one clicks a niche and sees where its descendants go.
+
+    The page is one HTML file that needs no network.
+    """
+
+    path: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="PATH")]
+    """Archive folder, or the name of an archive that ships with nichechain."""
+    out: Path = Path("explore.html")
+    """Page to write."""
+    l: int = 5  # noqa: E741  # the paper's name
+    """Generations that it shows first, 1 to 10."""
+    lineages: int = 100
+    """Lineages U that it shows first."""
+    estimator: Literal["empirical-bayes", "dirichlet", "mle"] = "empirical-bayes"
+    """How T is estimated."""
+    draws: int = 20
+    """Posterior draws of T behind the intervals."""
+    seed: int = 0
+    """Seed of the draws."""
+
+
+def run(arguments: Sequence[str]) -> int:
+    """Write the page."""
+    command = console.parse(Explore, arguments)
+    if not command.out.parent.is_dir():
+        raise NichechainError(f"--out is {str(command.out)!r}, but there is no folder {command.out.parent}")
+    if command.out.is_dir():
+        raise NichechainError(f"--out is {str(command.out)!r}, but that is a folder")
+    if command.seed < 0:
+        raise NichechainError(f"--seed is {command.seed}, but must not be negative")
+    from nichechain.archive import load
+    from nichechain.plots.explorer import write_explorer
+
+    archive = load(command.path)
+    with console.spinner("computing intervals over posterior draws"):
+        write_explorer(
+            archive,
+            archive.chain(command.estimator),
+            command.out,
+            l=command.l,
+            lineages=command.lineages,
+            draws=command.draws,
+            seed=command.seed,
+        )
+    size = command.out.stat().st_size
+    console.console().print(f"wrote {command.out} ({size / 1e6:.1f} MB): open it in a browser")
+    return 0

@@ -1,0 +1,306 @@
+"""A page to explore a chain with: click a niche, see where its descendants go.
+
+The page holds everything it shows and asks nothing of any network. What it computes itself it
+computes from the posterior mean of T, a *plug-in*; means and intervals over posterior draws are
+computed here and shown beside it.
+"""
+
+from __future__ import annotations
+
+import base64
+import json
+import os
+from dataclasses import dataclass
+from importlib.resources import files
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from nichechain.chain.draws import transition_draws
+from nichechain.chain.graph import LONG_JUMP
+from nichechain.chain.wormholes import wormholes
+from nichechain.coverage import check_lengths
+from nichechain.errors import NichechainError
+from nichechain.plots.growth import coverage_by_generation
+
+if TYPE_CHECKING:
+    from nichechain.archive import Archive
+    from nichechain.chain import NicheChain
+
+Floats = NDArray[np.float64]
+Floats32 = NDArray[np.float32]
+
+LONGEST = 10
+"""Generations that the page's slider goes up to."""
+
+# One program in parts: they see each other's names.
+_PROGRAM = ("chain.js", "shown.js", "map.js", "panel.js", "page.js")
+# Returns are found by products of whole matrices, which take memory and time.
+_STATES = 4_000
+# Numbers of lineages that intervals are computed for, besides the one asked for.
+_LINEAGES = (10, 1000)
+_MOST_LINEAGES = 10_000
+
+
+@dataclass(frozen=True)
+class CompactTransition:
+    """T as a page keeps it, exact: what births say one by one, what all rows share once.
+
+    T_ij is ``kept[i, j] + rest[i] * pool[j] + spread[i] * kernel[displacement from i to j]``, the
+    last between niches only; the mean of a posterior has just these parts.
+
+    Parameters
+    ----------
+    kept : (S, S) scipy.sparse.csr_array of float32
+    rest, pool, spread : (S,) float32 arrays
+    kernel : (2 k - 1, 2 m - 1) float32 array
+        For a grid of k by m niches.
+    """
+
+    kept: sparse.csr_array
+    rest: Floats32
+    pool: Floats32
+    spread: Floats32
+    kernel: Floats32
+
+    @classmethod
+    def of(cls, chain: NicheChain) -> CompactTransition:
+        """The transition matrix of a chain, its posterior mean where it is estimated with one."""
+        assert chain.niches is not None
+        states, n = chain.states, chain.n_niches
+        rest, spread = np.zeros(states), np.zeros(states)
+        if chain.posterior is None:
+            kernel = np.zeros(tuple(2 * k - 1 for k in chain.niches.shape))
+            return cls._narrow(sparse.csr_array(chain.T), rest, np.zeros(states), spread, kernel)
+        posterior, base = chain.posterior, chain.posterior.base
+        known = np.asarray(posterior.weights.sum(axis=1)).ravel()
+        prior = posterior.strength / (known + posterior.strength)
+        kept = (sparse.diags_array(1.0 / (known + posterior.strength)) @ posterior.weights).tolil()
+        anywhere, displaced, uniform = base.weights
+        shared = anywhere * base.destination + uniform / states
+        rest[:n] = prior[:n] * shared.sum()
+        spread[:n] = prior[:n] * displaced * (1.0 - base.leaving) / base.within
+        if states > n:
+            if displaced * base.leaving > 0:
+                kept[:n, n] = kept[:n, [n]].toarray().ravel() + prior[:n] * displaced * base.leaving
+            # Nothing is displaced from outside: that row has a prior of its own.
+            kept[[n]] = posterior.mean()[[n]]
+        return cls._narrow(kept.tocsr(), rest, shared / shared.sum(), spread, base.displacement)
+
+    @classmethod
+    def _narrow(
+        cls, kept: sparse.csr_array, rest: Floats, pool: Floats, spread: Floats, kernel: Floats
+    ) -> CompactTransition:
+        narrow = kept.astype(np.float32)
+        narrow.eliminate_zeros()
+        narrow.sort_indices()
+        return cls(narrow, *(part.astype(np.float32) for part in (rest, pool, spread, kernel)))
+
+    def toarray(self) -> Floats:
+        """The matrix, (S, S)."""
+        whole: Floats = self.kept.toarray().astype(np.float64)
+        whole += np.outer(self.rest.astype(np.float64), self.pool.astype(np.float64))
+        columns, rows = ((side + 1) // 2 for side in self.kernel.shape)
+        i, j = np.divmod(np.arange(columns * rows), rows)
+        for niche in np.flatnonzero(self.spread[: i.size]):
+            displaced = self.kernel[i - i[niche] + columns - 1, j - j[niche] + rows - 1].astype(np.float64)
+            whole[niche, : i.size] += float(self.spread[niche]) * displaced
+        return whole
+
+    def returns(self, steps: int) -> Floats:
+        """Probabilities (T^k)_jj of being back in a state after k = 1 … ``steps``, (steps, S).
+
+        With them the page needs no more than the powers' product with one row: a visit at step k
+        is a first visit at some step i and a return after k − i (the renewal equation).
+        """
+        one = self.toarray()
+        powers = [np.eye(len(one)), one]
+        for _ in range(2, (steps + 1) // 2 + 1):
+            powers.append(powers[-1] @ one)
+        # (T^(a+b))_jj = Σ_i (T^a)_ji (T^b)_ij: half the powers are enough.
+        return np.array(
+            [np.einsum("ij,ji->i", powers[(k + 1) // 2], powers[k // 2]) for k in range(1, steps + 1)]
+        )
+
+
+def write_explorer(
+    archive: Archive,
+    chain: NicheChain,
+    out: Path,
+    *,
+    l: int = 5,  # noqa: E741  # the paper's name
+    lineages: int = 100,
+    draws: int = 20,
+    seed: int = 0,
+) -> None:
+    """Write the page, one self-contained HTML file.
+
+    Parameters
+    ----------
+    archive : Archive
+        Of two axes of behavior.
+    chain : NicheChain
+        Its chain.
+    out : Path
+        Appears whole or not at all.
+    l, lineages : int
+        What the page shows first: generations (1 to 10) and lineages U (1 to 10,000).
+    draws, seed : int
+        Posterior draws of T behind the intervals.
+
+    Raises
+    ------
+    NichechainError
+        If a number is out of range, behavior does not have two axes, or there are too many niches.
+    """
+    text = explorer_page(archive, chain, l=l, lineages=lineages, draws=draws, seed=seed)
+    part = out.with_name(out.name + ".tmp")
+    try:
+        with part.open("w", encoding="utf-8", newline="\n") as file:
+            file.write(text)
+            file.flush()
+            os.fsync(file.fileno())
+        part.replace(out)
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def explorer_page(
+    archive: Archive,
+    chain: NicheChain,
+    *,
+    l: int = 5,  # noqa: E741
+    lineages: int = 100,
+    draws: int = 20,
+    seed: int = 0,
+) -> str:
+    """The page as text; see :func:`write_explorer`."""
+    check_lengths(l, lineages)
+    if l > LONGEST:
+        raise NichechainError(f"l is {l}, but the page goes up to {LONGEST} generations")
+    if lineages > _MOST_LINEAGES:
+        raise NichechainError(f"lineages is {lineages}, but the page goes up to {_MOST_LINEAGES}")
+    if draws < 1:
+        raise NichechainError(f"draws is {draws}, but at least 1 is needed")
+    axes = len(archive.meta.facts.behavior_names)
+    if axes != 2:
+        raise NichechainError(f"behavior has {axes} axes, but the page is a map over 2")
+    if chain.niches != archive.niches:
+        raise NichechainError(f"the chain is not over the niches of {archive.folder}")
+    if chain.states > _STATES:
+        raise NichechainError(f"the chain has {chain.states} states, but a page holds at most {_STATES}")
+    content = {
+        **_facts(archive, chain),
+        **_elites(archive),
+        **_transition(chain),
+        **_observed(archive, chain),
+        **_intervals(chain, l, lineages, draws, seed),
+    }
+    style, program = _text("page.css"), "\n".join(map(_text, _PROGRAM))
+    # Within an element, only the sign that could end it has to be written differently.
+    data = json.dumps(content, allow_nan=False, separators=(",", ":")).replace("<", "\\u003c")
+    page = _text("page.html")
+    # Data come last, so that no mark is looked for in them.
+    for mark, text in (("STYLE", style), ("PROGRAM", program), ("DATA", data)):
+        page = page.replace(f"/*{mark}*/", text, 1)
+    return page
+
+
+def _text(name: str) -> str:
+    return files(__name__).joinpath(name).read_text(encoding="utf-8")
+
+
+def _facts(archive: Archive, chain: NicheChain) -> dict[str, Any]:
+    facts, niches, counts = archive.meta.facts, archive.niches, archive.counts
+    return {
+        "name": archive.folder.resolve().name,
+        "domain": archive.config.domain,
+        "births": archive.meta.births,
+        "birthsOutside": counts.births_outside,
+        "filled": archive.filled,
+        "shape": list(niches.shape),
+        "bounds": [list(pair) for pair in niches.bounds],
+        "axes": list(facts.behavior_names),
+        "unit": facts.unit,
+        "objectiveName": facts.objective_name,
+        "start": None if facts.start is None else list(facts.start),
+        "states": chain.states,
+        "niches": chain.n_niches,
+        "estimator": chain.estimator,
+        "longJump": LONG_JUMP,
+        "visits": _packed(counts.visits, np.uint32),
+        "children": _packed(counts.births, np.uint32),
+    }
+
+
+def _elites(archive: Archive) -> dict[str, Any]:
+    """Of every niche; NaN where there is none."""
+    elites = archive.elites
+    inside = elites.niche < len(archive.niches)
+    found = np.full((5, len(archive.niches)), np.nan)
+    found[:, elites.niche[inside]] = [
+        elites.objective[inside],
+        elites.depth[inside],
+        elites.uid[inside],
+        *elites.behavior[inside].T,
+    ]
+    return {"elites": _packed(found, np.float64)}
+
+
+def _transition(chain: NicheChain) -> dict[str, Any]:
+    compact = CompactTransition.of(chain)
+    return {
+        "rowStart": _packed(compact.kept.indptr, np.uint32),
+        "column": _packed(compact.kept.indices, np.uint16),
+        "probability": _packed(compact.kept.data, np.float32),
+        "rest": _packed(compact.rest, np.float32),
+        "pool": _packed(compact.pool, np.float32),
+        "spread": _packed(compact.spread, np.float32),
+        "kernel": _packed(compact.kernel, np.float32),
+        "returns": _packed(compact.returns(LONGEST - 1), np.float64),
+    }
+
+
+def _observed(archive: Archive, chain: NicheChain) -> dict[str, Any]:
+    """Births of every pair of states, and which pairs are wormholes."""
+    matrix = archive.counts.matrix.tocsr()
+    matrix.sort_indices()
+    found: dict[str, Any] = {
+        "countStart": _packed(matrix.indptr, np.uint32),
+        "countColumn": _packed(matrix.indices, np.uint16),
+        "count": _packed(matrix.data, np.uint32),
+        "wormholes": None,
+    }
+    if chain.posterior is not None:
+        flagged = wormholes(chain, beyond="both")
+        flagged = flagged[flagged["wormhole"]]
+        pairs = zip(flagged["parent"], flagged["child"], flagged["exceeds"], strict=True)
+        found["wormholes"] = [[int(i), int(j), round(float(p), 4)] for i, j, p in pairs]
+    return found
+
+
+def _intervals(chain: NicheChain, l: int, lineages: int, draws: int, seed: int) -> dict[str, Any]:  # noqa: E741
+    """Mean, 5 % and 95 % quantile over the draws: (3, U, l, niches)."""
+    sizes = sorted({*_LINEAGES, lineages})
+    roots = np.arange(chain.n_niches)
+    drawn = [
+        coverage_by_generation(matrix, roots, LONGEST, sizes, chain.n_niches).astype(np.float32)
+        for matrix in transition_draws(chain, draws, seed)
+    ]
+    summary = np.stack([np.mean(drawn, axis=0), *np.quantile(drawn, (0.05, 0.95), axis=0)])
+    return {
+        "l": l,
+        "lineages": lineages,
+        "draws": len(drawn) if chain.posterior is not None else 0,
+        "sizes": sizes,
+        "scores": _packed(summary.transpose(0, 3, 2, 1), np.float32),
+    }
+
+
+def _packed(values: Any, kind: type[np.generic]) -> str:
+    """An array as base64, little-endian, which is what every browser's typed arrays are."""
+    array = np.ascontiguousarray(values).astype(np.dtype(kind).newbyteorder("<"))
+    return base64.b64encode(array.tobytes()).decode("ascii")

@@ -1,0 +1,220 @@
+"""Curves of l-evolvability: against the generations l, and against the number U of lineages."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from nichechain.chain.draws import transition_draws
+from nichechain.chain.model import Matrix, NicheChain
+from nichechain.coverage import check_lengths
+from nichechain.errors import NichechainError
+from nichechain.evolvability.averaging import ENDLESS, SATURATED
+from nichechain.niches import Niche
+from nichechain.plots.style import EDGE, INK, LONG_JUMP, START
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+# Lines of up to four niches: told apart by lightness and by marker as well as by hue.
+_COLORS = (EDGE, LONG_JUMP, START, "#4a4a4a")
+_MARKERS = ("o", "s", "^", "D")
+_COLUMNS = 128
+_DENSE = 0.3
+
+
+def coverage_by_generation(
+    transition: Matrix, roots: ArrayLike, generations: int, lineages: ArrayLike, counted: int
+) -> Floats:
+    """Expected niches that lineages of roots visit, for every length up to the longest.
+
+    Parameters
+    ----------
+    transition : (S, S) row-stochastic matrix
+    roots : (m,) ints
+        States that the roots stand in; generation 1 is drawn from their rows.
+    generations : int
+        The longest lineage l, at least 1.
+    lineages : (k,) ints
+        Numbers U of lineages, each at least 1.
+    counted : int
+        Only the first so many states are niches that count.
+
+    Returns
+    -------
+    (m, generations, k) float64 array
+        Entry [i, g − 1, u] is what :func:`nichechain.coverage.expected_coverage` gives for g
+        generations.
+
+    Notes
+    -----
+    With first rows out of T itself, T · H_{g−1} is at once the answer for g generations and, its
+    diagonal set to 1, the H_g of the next: all lengths cost no more than the longest.
+    """
+    states = np.asarray(roots, np.int64)
+    sizes = np.asarray(lineages, np.int64)
+    check_lengths(generations, sizes.min())
+    if not isinstance(transition, np.ndarray) and transition.nnz > _DENSE * transition.shape[0] ** 2:
+        # A dense product is then the faster one.
+        transition = transition.toarray()
+    found = np.zeros((states.size, generations, sizes.size))
+    for start in range(0, counted, _COLUMNS):
+        targets = np.arange(start, min(start + _COLUMNS, counted))
+        hit = np.zeros((transition.shape[0], targets.size))
+        hit[targets, targets - start] = 1.0
+        for step in range(generations):
+            hit = transition @ hit
+            with np.errstate(divide="ignore"):
+                missed = np.log1p(-np.minimum(hit[states], 1.0))
+            for k, size in enumerate(sizes):
+                found[:, step, k] -= np.expm1(int(size) * missed).sum(axis=1)
+            # A lineage that stands on its target has visited it, wherever it goes next.
+            hit[targets, targets - start] = 1.0
+    return found
+
+
+def plot_generations(
+    chain: NicheChain,
+    ax: Axes,
+    *,
+    niches: Sequence[Niche],
+    lineages: int = 100,
+    longest: int = 10,
+    draws: int = 20,
+    seed: int = 0,
+) -> Axes:
+    """l-evolvability of some niches against l, with 90 % bands, hollow where U saturates.
+
+    Parameters
+    ----------
+    chain : NicheChain
+    ax : matplotlib.axes.Axes
+    niches : sequence of int or tuple of int
+        One to four of them.
+    lineages : int
+        U.
+    longest : int
+        Largest l.
+    draws, seed : int
+        Posterior draws of T, where it is estimated.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+
+    Raises
+    ------
+    NichechainError
+        If a niche does not exist, a number is out of range, or there are too many niches.
+    """
+    covered = _covered(chain, niches, longest, np.array([lineages, ENDLESS]), draws, seed)
+    _lines(ax, chain, niches, np.arange(1, longest + 1), covered[..., 0], covered[..., 1])
+    ax.set(xlabel="generations l", xlim=(0.5, longest + 0.5), title=f"Against l, {lineages} lineages")
+    ax.set_xticks(range(1, longest + 1, 1 + longest // 16))
+    return ax
+
+
+def plot_lineages(
+    chain: NicheChain,
+    ax: Axes,
+    *,
+    niches: Sequence[Niche],
+    l: int = 5,  # noqa: E741  # the paper's name
+    most: int = 10_000,
+    draws: int = 20,
+    seed: int = 0,
+) -> Axes:
+    """l-evolvability of some niches against U, with 90 % bands, hollow where U saturates.
+
+    Parameters
+    ----------
+    chain, ax, niches, draws, seed
+        As in :func:`plot_generations`.
+    l : int
+        Generations.
+    most : int
+        Largest U, at least 2.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+
+    Raises
+    ------
+    NichechainError
+        As in :func:`plot_generations`.
+    """
+    if most < 2:
+        raise NichechainError(f"most is {most}, but must be at least 2")
+    sizes = np.unique(np.round(np.geomspace(1, most, 17)).astype(np.int64))
+    covered = _covered(chain, niches, l, np.append(sizes, ENDLESS), draws, seed)[:, :, -1]
+    _lines(ax, chain, niches, sizes, covered[..., :-1], covered[..., -1:])
+    ax.set(xscale="log", xlabel="lineages U", title=f"Against U, {l} generations")
+    return ax
+
+
+def _covered(
+    chain: NicheChain, niches: Sequence[Niche], longest: int, lineages: Ints, draws: int, seed: int
+) -> Floats:
+    """Coverage (draws, niches, generations, lineages)."""
+    if not 1 <= len(niches) <= len(_COLORS):
+        raise NichechainError(f"{len(niches)} niches are given, but one to {len(_COLORS)} can be told apart")
+    if draws < 1:
+        raise NichechainError(f"draws is {draws}, but at least 1 is needed")
+    roots = [chain.state(niche) for niche in niches]
+    return np.array(
+        [
+            coverage_by_generation(matrix, roots, longest, lineages, chain.n_niches)
+            for matrix in transition_draws(chain, draws, seed)
+        ]
+    )
+
+
+def _lines(
+    ax: Axes, chain: NicheChain, niches: Sequence[Niche], x: Ints, values: Floats, endless: Floats
+) -> None:
+    """A line for each niche of (draws, niches, x); ``endless`` is what no U can exceed."""
+    from matplotlib.lines import Line2D
+
+    hollows = False
+    for number in range(len(niches)):
+        here = values[:, number]
+        mean = here.mean(axis=0)
+        low, high = np.quantile(here, (0.05, 0.95), axis=0)
+        saturated = np.median(here / endless[:, number], axis=0) > SATURATED
+        hollows |= bool(saturated.any())
+        color, marker = _COLORS[number], _MARKERS[number]
+        ax.fill_between(x, low, high, color=color, alpha=0.15, linewidth=0)
+        ax.plot(x, mean, color=color, linewidth=1.4, zorder=3)
+        for hollow in (False, True):
+            chosen = saturated == hollow
+            ax.plot(
+                x[chosen],
+                mean[chosen],
+                marker,
+                color=color,
+                markerfacecolor="white" if hollow else color,
+                markersize=5,
+                linestyle="none",
+                zorder=4,
+            )
+    handles = [
+        Line2D(
+            [], [], color=_COLORS[k], marker=_MARKERS[k], markersize=5, label=chain.label(chain.state(niche))
+        )
+        for k, niche in enumerate(niches)
+    ]
+    if hollows:
+        words = "saturated: over 95 % of what\nendless lineages would visit"
+        dot = Line2D([], [], color=INK, marker="o", markerfacecolor="white", linestyle="none", label=words)
+        handles.append(dot)
+    ax.legend(handles=handles, title="niche", alignment="left", frameon=False, fontsize="small")
+    ax.set(ylabel="niches reached (90 % band)", ylim=(0.0, None))
+    ax.tick_params(length=3, color=INK)
+    ax.spines[["top", "right"]].set_visible(False)
