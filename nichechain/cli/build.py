@@ -13,7 +13,6 @@ from nichechain.cli import console
 from nichechain.config import BuildConfig, MutationName, Outside, Replacement
 from nichechain.errors import ArchiveError, NichechainError
 
-
 _MANY_NICHES = 1000
 
 
