@@ -18,10 +18,13 @@ if TYPE_CHECKING:
     from nichechain.errors import ArchiveError, NichechainError
     from nichechain.evolvability import (
         Evolvability,
+        NicheBand,
         NicheEvolvability,
+        bootstrap_elites,
         genotype_evolvability,
         l_evolvability,
         niche_evolvability,
+        prior_sensitivity,
     )
     from nichechain.execution import Threads
     from nichechain.niches import GridNiches
@@ -36,17 +39,20 @@ _HOMES = {
     "Elite": "archive",
     "Evolvability": "evolvability",
     "GridNiches": "niches",
+    "NicheBand": "evolvability",
     "NicheChain": "chain",
     "NicheEvolvability": "evolvability",
     "NichechainError": "errors",
     "Threads": "execution",
     "TransitionCounts": "chain",
+    "bootstrap_elites": "evolvability",
     "build": "building",
     "estimate": "chain",
     "genotype_evolvability": "evolvability",
     "l_evolvability": "evolvability",
     "load": "archive",
     "niche_evolvability": "evolvability",
+    "prior_sensitivity": "evolvability",
 }
 
 __all__ = [
@@ -56,11 +62,13 @@ __all__ = [
     "Elite",
     "Evolvability",
     "GridNiches",
+    "NicheBand",
     "NicheChain",
     "NicheEvolvability",
     "NichechainError",
     "Threads",
     "TransitionCounts",
+    "bootstrap_elites",
     "build",
     "domains",
     "estimate",
@@ -68,6 +76,7 @@ __all__ = [
     "l_evolvability",
     "load",
     "niche_evolvability",
+    "prior_sensitivity",
 ]
 
 

@@ -120,7 +120,7 @@ def visit_probabilities(
 
 
 def sampled_coverage(
-    transition: sparse.csr_array | Floats,
+    transition: LinearMap,
     first: Floats,
     generations: int,
     lineages: int,
@@ -151,14 +151,14 @@ def sampled_coverage(
     Raises
     ------
     NichechainError
-        If a number is below 1.
+        If a number is below 1, or T has too many entries to walk by.
     """
     check_lengths(generations, lineages)
     if repeats < 1:
         raise NichechainError(f"repeats is {repeats}, but at least 1 is needed")
     states = transition.shape[0]
     niches = states if counted is None else counted
-    step = RowSampler(sparse.csr_array(transition))
+    step = RowSampler(entries(transition))
     start = RowSampler(sparse.csr_array(first[None, :]))
     at_once = max(1, _SIMULATION_CELLS // max(states, lineages))
     found = []
@@ -173,6 +173,22 @@ def sampled_coverage(
             seen[repeat, here] = True
         found.append(np.count_nonzero(seen[:, :niches], axis=1))
     return np.concatenate(found)
+
+
+def entries(transition: LinearMap) -> sparse.csr_array:
+    """The entries of a matrix, to walk by.
+
+    Raises
+    ------
+    NichechainError
+        If it is neither an array nor sparse.
+    """
+    if not (isinstance(transition, np.ndarray) or sparse.issparse(transition)):
+        raise NichechainError(
+            f"T has {transition.shape[0]} states and too many entries to simulate walks: "
+            "ask for the exact value, or for fewer niches"
+        )
+    return sparse.csr_array(transition)
 
 
 def rarefied_coverage(counts: ArrayLike, size: int, *, counted: int | None = None) -> float:

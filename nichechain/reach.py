@@ -11,7 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
 from nichechain.chain.draws import Root, generations, transition_draws
-from nichechain.chain.model import Matrix, NicheChain
+from nichechain.chain.model import NicheChain, Transition
+from nichechain.chain.operator import PooledTransition
 from nichechain.chain.returns import return_probabilities
 from nichechain.coverage import check_lengths, visit_probabilities
 from nichechain.errors import NichechainError
@@ -153,7 +154,7 @@ def reach(
     )
 
 
-def visit_probability(transition: Matrix, first: Floats, steps: int) -> tuple[Floats, Floats]:
+def visit_probability(transition: Transition, first: Floats, steps: int) -> tuple[Floats, Floats]:
     """Probability that a walk visits each state, and how often it does in expectation.
 
     Parameters
@@ -177,13 +178,18 @@ def visit_probability(transition: Matrix, first: Floats, steps: int) -> tuple[Fl
     states that are reached, and only for as many steps as are left by then. In a matrix that is
     not sparse they soon see all others; the recursion over all roots is faster there.
     """
-    rows = sparse.csr_array(transition)
+    rows: sparse.csr_array | PooledTransition
+    if isinstance(transition, PooledTransition):
+        rows, dense = transition, True
+    else:
+        rows = sparse.csr_array(transition)
+        dense = rows.nnz > _DENSE * first.size**2
     present = np.zeros((steps, first.size))
     present[0] = first
     for k in range(1, steps):
         present[k] = present[k - 1] @ rows
     passes = present.sum(axis=0)
-    if rows.nnz > _DENSE * first.size**2:
+    if dense:
         blocks = [h for _, h in visit_probabilities(transition, first[None, :], steps)]
         return np.minimum(np.hstack(blocks)[0], 1.0), passes
     reached = present > 0.0

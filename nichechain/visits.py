@@ -13,8 +13,8 @@ from scipy import sparse
 
 from nichechain.alias import RowSampler
 from nichechain.chain.draws import Root, generations, transition_draws
-from nichechain.chain.model import Matrix, NicheChain
-from nichechain.coverage import check_lengths
+from nichechain.chain.model import NicheChain, Transition
+from nichechain.coverage import check_lengths, entries
 from nichechain.errors import NichechainError
 from nichechain.evolvability import DRAWS, Convention
 from nichechain.niches import Niche
@@ -194,7 +194,7 @@ def _bits(shares: Floats) -> Floats:
 
 
 def _walks(
-    transition: Matrix,
+    transition: Transition,
     first: Floats,
     start: int | None,
     steps: int,
@@ -204,7 +204,7 @@ def _walks(
     chain: NicheChain,
 ) -> Iterator[Floats]:
     """Metrics of simulated repeats, (5, r) at a time, in the order of the fields."""
-    onward = RowSampler(sparse.csr_array(transition))
+    onward = RowSampler(entries(transition))
     begin = RowSampler(sparse.csr_array(first[None, :]))
     centers = _centers(chain)
     at_once = max(1, _CELLS // max(chain.states, lineages))

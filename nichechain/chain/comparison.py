@@ -111,7 +111,7 @@ def compare_estimators(counts: TransitionCounts, *, folds: int = 5, seed: int = 
     """
     if folds < 2:
         raise NichechainError(f"folds is {folds}, but at least 2 are needed")
-    families = _families(counts)
+    families = families_of(counts)
     _, elite = np.unique(families[:, :2], axis=0, return_inverse=True)
     elite = elite.ravel()
     elites = int(elite.max(initial=-1)) + 1
@@ -123,7 +123,7 @@ def compare_estimators(counts: TransitionCounts, *, folds: int = 5, seed: int = 
     foretold = {name: np.zeros(len(families)) for name in fits}
     for turn in range(folds):
         out = fold == turn
-        seen = _counts(families[~out], counts)
+        seen = counts_of_families(families[~out], counts)
         for name, fit in fits.items():
             foretold[name][out] = _probability(fit(seen), parent[out], child[out])
     reference = next(iter(foretold.values()))
@@ -183,7 +183,7 @@ def _fits(counts: TransitionCounts) -> Iterator[tuple[str, Fit]]:
             yield f"mle, unvisited: {policy}", partial(estimate, estimator="mle", unvisited=policy)
 
 
-def _families(counts: TransitionCounts) -> Ints:
+def families_of(counts: TransitionCounts) -> Ints:
     """Rows (state, elite, child, children); children of nobody in particular are elites' only ones."""
     known = TransitionCounts.from_pairs(
         counts.families[:, 0], counts.families[:, 2], counts.niches, counts.families[:, 3]
@@ -195,7 +195,8 @@ def _families(counts: TransitionCounts) -> Ints:
     return np.concatenate([counts.families, alone]).astype(np.int64)
 
 
-def _counts(families: Ints, counts: TransitionCounts) -> TransitionCounts:
+def counts_of_families(families: Ints, counts: TransitionCounts) -> TransitionCounts:
+    """Counts of some families (F, 4), over the niches of the counts that they come from."""
     pairs = TransitionCounts.from_pairs(families[:, 0], families[:, 2], counts.niches, families[:, 3])
     return TransitionCounts(pairs.matrix, counts.niches, pairs.visits, families)
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from nichechain.chain.model import Matrix, NicheChain
+from nichechain.chain.model import NicheChain, Transition
 from nichechain.errors import NichechainError
 from nichechain.niches import Niche
 from nichechain.randomness import Purpose, keyed
@@ -15,7 +15,7 @@ from nichechain.randomness import Purpose, keyed
 Floats = NDArray[np.float64]
 
 
-def transition_draws(chain: NicheChain, draws: int, seed: int) -> Iterator[Matrix]:
+def transition_draws(chain: NicheChain, draws: int, seed: int) -> Iterator[Transition]:
     """T itself where it is given, draws from its posterior where it is estimated with one.
 
     Parameters
@@ -28,10 +28,10 @@ def transition_draws(chain: NicheChain, draws: int, seed: int) -> Iterator[Matri
 
     Yields
     ------
-    (S, S) array or scipy.sparse.csr_array
+    (S, S) array, scipy.sparse.csr_array or PooledTransition
     """
     if chain.posterior is None:
-        yield chain.T
+        yield chain.operator
         return
     for number in range(draws):
         yield chain.posterior.draw(keyed(seed, Purpose.POSTERIOR, number))
@@ -66,7 +66,7 @@ class Root:
         else:
             self._distribution[self.state] = 1.0
 
-    def first(self, transition: Matrix, convention: str) -> Floats:
+    def first(self, transition: Transition, convention: str) -> Floats:
         """Distribution of the first state that counts, (S,).
 
         Under ``procedure`` that is the root's own state, under ``definition`` its child's.

@@ -11,7 +11,8 @@ from scipy import sparse
 from nichechain.chain.base_measure import BaseMeasure
 from nichechain.chain.counts import TransitionCounts
 from nichechain.chain.empirical_bayes import design_effect, most_likely
-from nichechain.chain.model import NicheChain
+from nichechain.chain.model import NicheChain, Transition
+from nichechain.chain.operator import PooledTransition
 from nichechain.chain.posterior import DirichletPosterior
 from nichechain.errors import NichechainError
 
@@ -19,6 +20,9 @@ Floats = NDArray[np.float64]
 
 Estimator = Literal["empirical-bayes", "dirichlet", "mle"]
 Unvisited = Literal["self", "uniform", "base", "absorb"]
+# Numbers in rows that are filled whole, above which they are kept as one row that they share.
+_FILLED = 20_000_000
+
 ESTIMATORS: tuple[str, ...] = get_args(Estimator)
 UNVISITED: tuple[str, ...] = get_args(Unvisited)
 
@@ -88,22 +92,31 @@ def _mle(counts: TransitionCounts, unvisited: str) -> NicheChain:
         per_row[states - 1] = 0.0
     observed = sparse.diags_array(per_row) @ counts.matrix
     filler = sparse.lil_array((states, states))
+    shared = np.zeros(states)
     match unvisited:
         case "self":
             filler[empty, empty] = 1.0
         case "absorb":
             filler[empty, states - 1] = 1.0
         case "uniform":
-            filler[empty] = 1.0 / states
+            shared[:] = 1.0 / states
         case "base":
             landed = np.bincount(counts.matrix.indices, counts.matrix.data, states)
             if not landed.sum():
                 raise NichechainError("unvisited is 'base', but no birth says where children land")
-            filler[empty] = landed / landed.sum()
+            shared = landed / landed.sum()
+    whole = shared.any() and empty.size * states <= _FILLED
+    if whole:
+        filler[empty] = shared
     if counts.niches.outside == "absorb":
         filler[states - 1, states - 1] = 1.0
+    transition: Transition = (observed + filler.tocsr()).tocsr()
+    if shared.any() and not whole:
+        share = np.zeros(states)
+        share[empty] = 1.0
+        transition = PooledTransition.shared(transition, share, shared)
     return NicheChain(
-        (observed + filler.tocsr()).tocsr(),
+        transition,
         niches=counts.niches,
         outside=states - 1 if has_outside else None,
         counts=counts,
@@ -122,7 +135,7 @@ def _dirichlet(counts: TransitionCounts, strength: float | str) -> NicheChain:
         size = _positive(strength)
     base = BaseMeasure.pooled(counts, np.array([0.0, 0.0, 1.0]))
     posterior = DirichletPosterior(counts, base, size, np.ones(states))
-    return _estimated(counts, posterior, f"dirichlet, uniform base, strength {size:.3g}")
+    return with_posterior(counts, posterior, f"dirichlet, uniform base, strength {size:.3g}")
 
 
 def _empirical_bayes(counts: TransitionCounts, strength: float | None) -> NicheChain:
@@ -132,10 +145,11 @@ def _empirical_bayes(counts: TransitionCounts, strength: float | None) -> NicheC
     births = counts.births
     typical = (births * effect).sum() / max(1, births.sum())
     related = f", {typical:.2g} births count as one" if typical >= 1.05 else ""
-    return _estimated(counts, posterior, f"empirical-bayes, strength {fitted:.3g}{related}")
+    return with_posterior(counts, posterior, f"empirical-bayes, strength {fitted:.3g}{related}")
 
 
-def _estimated(counts: TransitionCounts, posterior: DirichletPosterior, name: str) -> NicheChain:
+def with_posterior(counts: TransitionCounts, posterior: DirichletPosterior, name: str) -> NicheChain:
+    """The chain of counts and of a posterior for T, under the estimator's name."""
     states = counts.niches.states
     return NicheChain(
         posterior=posterior,

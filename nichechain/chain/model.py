@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
+from nichechain.chain.operator import PooledTransition
 from nichechain.errors import NichechainError
 from nichechain.niches import GridNiches, Niche
 
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 Matrix: TypeAlias = "Floats | sparse.csr_array"
+Transition: TypeAlias = "Matrix | PooledTransition"
 
 
 class NicheChain:
@@ -27,7 +29,7 @@ class NicheChain:
 
     Parameters
     ----------
-    transition : (S, S) array or scipy.sparse matrix, optional
+    transition : (S, S) array, scipy.sparse matrix or PooledTransition, optional
         ``transition[i, j]`` = P(child in state j | parent in state i). Left out where there is a
         posterior.
     outside : int, optional
@@ -50,7 +52,7 @@ class NicheChain:
 
     def __init__(
         self,
-        transition: ArrayLike | sparse.sparray | sparse.spmatrix | None = None,
+        transition: ArrayLike | sparse.sparray | sparse.spmatrix | PooledTransition | None = None,
         *,
         outside: int | None = None,
         niches: GridNiches | None = None,
@@ -82,10 +84,20 @@ class NicheChain:
     @cached_property
     def T(self) -> Matrix:  # noqa: N802  # the paper's name
         """The transition matrix (S, S); its posterior mean where it was estimated with one."""
+        if isinstance(self._given, PooledTransition):
+            return self._given.toarray()
         if self._given is not None:
             return self._given
         assert self.posterior is not None
         return self.posterior.mean()
+
+    @cached_property
+    def operator(self) -> Transition:
+        """T to multiply with: the same, but kept in parts where it was estimated with a posterior."""
+        if self._given is not None:
+            return self._given
+        assert self.posterior is not None
+        return self.posterior.mean_operator()
 
     @property
     def births(self) -> NDArray[np.int64] | None:
@@ -131,8 +143,10 @@ class NicheChain:
         return reachability_graph(self, threshold)
 
 
-def _stochastic(transition: ArrayLike | sparse.sparray | sparse.spmatrix) -> Matrix:
+def _stochastic(transition: ArrayLike | sparse.sparray | sparse.spmatrix | PooledTransition) -> Transition:
     """The matrix in float64, sparse if it was, after checking that it is row-stochastic."""
+    if isinstance(transition, PooledTransition):
+        return transition
     matrix: Matrix
     if sparse.issparse(transition):
         as_given = sparse.csr_array(transition)

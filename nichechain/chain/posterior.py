@@ -12,6 +12,7 @@ from scipy import sparse
 
 from nichechain.chain.base_measure import BaseMeasure
 from nichechain.chain.counts import TransitionCounts
+from nichechain.chain.operator import PooledTransition
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -22,6 +23,10 @@ _DENSE_STATES = 1_500
 # A draw of the prior's part of a row leaves at most this much of it, in expectation, in one place.
 _REMAINDER = 1e-4
 _FEW_STATES = 16
+
+# Beyond so many states, rows are drawn in at most so many pieces in all, 100 MB of them.
+_MANY_STATES = 4_000
+_MOST_PIECES = 2_000_000
 
 
 @dataclass(frozen=True)
@@ -66,8 +71,17 @@ class DirichletPosterior:
             rows[-1, -1] = 1.0
         return rows
 
-    def draw(self, rng: np.random.Generator) -> sparse.csr_array:
-        """One T from the posterior, (S, S), sparse.
+    def mean_operator(self) -> PooledTransition:
+        """Posterior mean of T in parts: no S² numbers."""
+        total = self.counts.births / self.design_effect + self.strength
+        kept, prior = (sparse.diags_array(1.0 / total) @ self.weights).tocoo(), self.strength / total
+        entries = self._absorbed(kept.data, kept.coords)
+        if self.absorbing:
+            prior[-1] = 0.0
+        return PooledTransition.of(_collected(*entries, total.size), prior, self.base)
+
+    def draw(self, rng: np.random.Generator) -> sparse.csr_array | PooledTransition:
+        """One T from the posterior, (S, S): sparse, or a sum of parts.
 
         Notes
         -----
@@ -76,6 +90,10 @@ class DirichletPosterior:
         first part lives on the few states that were observed. The second is drawn by breaking a
         stick (Sethuraman 1994): its k-th piece, Beta(1, s) of what is left, goes to a state drawn
         from B. Pieces shrink fast, so a row of n states needs only about 9 s of them, not n.
+
+        Beyond 4,000 states and two million pieces, the second part is drawn as m atoms from B,
+        with weights and a share left to B itself that give it the mean and the covariances of
+        Dirichlet(s B), though not the higher moments, and T is a :class:`PooledTransition`.
         """
         matrix = self.weights.tocoo()
         rows, columns = matrix.coords
@@ -87,6 +105,8 @@ class DirichletPosterior:
         share = rng.standard_gamma(matrix.data)
         share *= (known / np.maximum(np.bincount(rows, share, states), np.finfo(float).tiny))[rows]
         pieces = self._pieces(states)
+        if states > _MANY_STATES and states * pieces > _MOST_PIECES:
+            return self._draw_atoms(known, (rows, columns, share), rng)
         # In a row of few states, gamma variates of tiny shape would all underflow.
         if pieces >= max(states, _FEW_STATES):
             return sparse.csr_array(self._draw_whole_rows(known, (rows, columns, share), rng))
@@ -100,11 +120,45 @@ class DirichletPosterior:
         landed = self.base.sample(parents, rng)
         data = np.concatenate([share, prior.ravel()])
         index = np.concatenate([rows, parents]), np.concatenate([columns, landed])
+        return _collected(*self._absorbed(data, index), states)
+
+    def _draw_atoms(
+        self, known: Floats, observed: tuple[Ints, Ints, Floats], rng: np.random.Generator
+    ) -> PooledTransition:
+        """The same where a stick would need too many pieces, right in mean and covariances."""
+        rows, columns, share = observed
+        states = known.size
+        atoms = max(1, _MOST_PIECES // states)
+        # With weights g over atoms from B, a share w of a row has covariances w² Σ E[g²] times those
+        # of one draw from B; a Dirichlet(s B) has 1 / (s + 1) times them.
+        if atoms > self.strength + 1.0:
+            # Σ E[g²] = (a + 1) / (m a + 1) for a symmetric Dirichlet of parameter a.
+            weight = rng.standard_gamma(self.strength / (atoms - self.strength - 1.0), (states, atoms))
+            weight /= weight.sum(axis=1, keepdims=True)
+            drawn = 1.0
+        else:
+            weight = np.full((states, atoms), 1.0 / atoms)
+            drawn = math.sqrt(atoms / (self.strength + 1.0))
+        weight *= drawn * (1.0 - known)[:, None]
+        parents = np.repeat(np.arange(states), atoms)
+        landed = self.base.sample(parents, rng)
+        data = np.concatenate([share, weight.ravel()])
+        index = np.concatenate([rows, parents]), np.concatenate([columns, landed])
+        prior = (1.0 - drawn) * (1.0 - known)
         if self.absorbing:
-            stays = index[0] < states - 1
-            data = np.append(data[stays], 1.0)
-            index = np.append(index[0][stays], states - 1), np.append(index[1][stays], states - 1)
-        return _collected(data, index, states)
+            prior[-1] = 0.0
+        return PooledTransition.of(_collected(*self._absorbed(data, index), states), prior, self.base)
+
+    def _absorbed(self, data: Floats, index: tuple[Ints, Ints]) -> tuple[Floats, tuple[Ints, Ints]]:
+        """Entries, with an outside that absorbs staying where it is."""
+        if not self.absorbing:
+            return data, index
+        last = self.counts.niches.states - 1
+        stays = index[0] < last
+        return np.append(data[stays], 1.0), (
+            np.append(index[0][stays], last),
+            np.append(index[1][stays], last),
+        )
 
     def _draw_whole_rows(
         self, known: Floats, observed: tuple[Floats, Floats, Floats], rng: np.random.Generator

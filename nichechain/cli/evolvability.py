@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from nichechain.archive import Archive
     from nichechain.chain import NicheChain
 
+_LABELS = {"posterior": "90 % interval", "prior": "prior band", "bootstrap": "90 % bootstrap"}
+
 
 @dataclass(frozen=True)
 class Evolvability:
@@ -52,6 +54,8 @@ class Evolvability:
     """Niches with fewer births behind their row of T are not ranked."""
     draws: int = 50
     """Posterior draws of T to average over."""
+    uncertainty: Literal["posterior", "prior", "bootstrap"] = "posterior"
+    """Interval over posterior draws, band over other priors, or bootstrap over each niche's elites."""
     repeats: int = 100
     """Simulations, for --method monte-carlo."""
     seed: int = 0
@@ -76,6 +80,9 @@ def run(arguments: Sequence[str]) -> int:
         frame = _one(command, archive, chain)
     else:
         frame = _best(command, chain)
+    frame["uncertainty"] = command.uncertainty
+    if command.uncertainty != "posterior":
+        _set_band(frame, command, archive)
     _write(frame, command)
     return 0
 
@@ -85,6 +92,14 @@ def _check(command: Evolvability) -> None:
     given = [name for name, value in chosen.items() if value is not None]
     if len(given) > 1:
         raise NichechainError(f"{' and '.join(given)} exclude each other: ask for one of them")
+    if command.uncertainty != "posterior":
+        wanted = f"--uncertainty {command.uncertainty}"
+        if command.elite is not None:
+            raise NichechainError(f"{wanted} is of niches, but --elite asks for a genotype: ask for --niche")
+        if command.estimator != "empirical-bayes":
+            raise NichechainError(f"{wanted} belongs to empirical-bayes, not to {command.estimator}")
+        if command.method != "exact":
+            raise NichechainError(f"{wanted} is computed in closed form, not by {command.method}")
     for name in ("top", "offspring", "draws", "repeats"):
         value = getattr(command, name)
         if value is not None and value < 1:
@@ -168,6 +183,34 @@ def _best(command: Evolvability, chain: NicheChain) -> pd.DataFrame:
     return frame
 
 
+def _set_band(frame: pd.DataFrame, command: Evolvability, archive: Archive) -> None:
+    """Put the bounds of another band in place of the posterior's interval."""
+    from nichechain.evolvability import bootstrap_elites, prior_sensitivity
+
+    if command.uncertainty == "prior":
+        band = prior_sensitivity(
+            archive.counts,
+            l=command.l,
+            lineages=command.lineages,
+            convention=command.convention,
+            draws=command.draws,
+            seed=command.seed,
+        )
+    else:
+        with console.spinner("resampling elites"):
+            band = bootstrap_elites(
+                archive.counts,
+                l=command.l,
+                lineages=command.lineages,
+                convention=command.convention,
+                seed=command.seed,
+            )
+    niche = frame["niche"].to_numpy()
+    # The bootstrap's own value may come from another number of draws than the one shown.
+    frame["low"] = frame["value"] + (band.low - band.value)[niche]
+    frame["high"] = frame["value"] + (band.high - band.value)[niche]
+
+
 def _write(frame: pd.DataFrame, command: Evolvability) -> None:
     if command.format == "csv":
         print(frame.to_csv(index=False), end="")
@@ -186,8 +229,9 @@ def _write(frame: pd.DataFrame, command: Evolvability) -> None:
     )
     if "offspring" in frame:
         shown.print(f"[dim]lineages begin at the niches of {first.offspring} offspring evaluated now[/]")
-    given = bool((frame["low"] == frame["high"]).all())
-    columns = [first.root, "niches reached", *([] if given else ["90 % interval"]), "± s.e."]
+    # A given T has no interval; a niche of one elite has a bootstrap, though without spread.
+    given = command.uncertainty == "posterior" and bool((frame["low"] == frame["high"]).all())
+    columns = [first.root, "niches reached", *([] if given else [_LABELS[command.uncertainty]]), "± s.e."]
     table = console.table(*columns, "births behind the row")
     for row in frame.itertuples():
         interval = [] if given else [f"{row.low:.2f} to {row.high:.2f}"]

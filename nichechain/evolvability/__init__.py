@@ -10,6 +10,7 @@ from nichechain.evolvability.averaging import DRAWS, Convention, Method
 from nichechain.evolvability.genotypes import FirstGeneration, genotype_evolvability
 from nichechain.evolvability.niches import l_evolvability, niche_evolvability
 from nichechain.evolvability.results import Evolvability, NicheEvolvability
+from nichechain.evolvability.uncertainty import NicheBand, bootstrap_elites, prior_sensitivity
 
 __all__ = [
     "DRAWS",
@@ -17,8 +18,11 @@ __all__ = [
     "Evolvability",
     "FirstGeneration",
     "Method",
+    "NicheBand",
     "NicheEvolvability",
+    "bootstrap_elites",
     "genotype_evolvability",
     "l_evolvability",
     "niche_evolvability",
+    "prior_sensitivity",
 ]

@@ -116,7 +116,7 @@ def genotype_evolvability(
         matrices = transition_draws(chain, draws, seed)
         if chain.posterior is None and first_generation == "posterior":
             # T is given, but D is not.
-            matrices = itertools.repeat(chain.T, draws)
+            matrices = itertools.repeat(chain.operator, draws)
         for number, matrix in enumerate(matrices):
             if first_generation == "empirical":
                 yield matrix, counts[None, :] / observed

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from nichechain.chain.draws import transition_draws
-from nichechain.chain.model import Matrix, NicheChain
+from nichechain.chain.model import NicheChain, Transition
+from nichechain.chain.operator import PooledTransition
 from nichechain.coverage import check_lengths
 from nichechain.errors import NichechainError
 from nichechain.evolvability.averaging import ENDLESS, SATURATED
@@ -30,7 +31,7 @@ _DENSE = 0.3
 
 
 def coverage_by_generation(
-    transition: Matrix, roots: ArrayLike, generations: int, lineages: ArrayLike, counted: int
+    transition: Transition, roots: ArrayLike, generations: int, lineages: ArrayLike, counted: int
 ) -> Floats:
     """Expected niches that lineages of roots visit, for every length up to the longest.
 
@@ -60,7 +61,10 @@ def coverage_by_generation(
     states = np.asarray(roots, np.int64)
     sizes = np.asarray(lineages, np.int64)
     check_lengths(generations, sizes.min())
-    if not isinstance(transition, np.ndarray) and transition.nnz > _DENSE * transition.shape[0] ** 2:
+    if (
+        not isinstance(transition, (np.ndarray, PooledTransition))
+        and transition.nnz > _DENSE * transition.shape[0] ** 2
+    ):
         # A dense product is then the faster one.
         transition = transition.toarray()
     found = np.zeros((states.size, generations, sizes.size))

@@ -217,7 +217,7 @@ def _transitions(chain: NicheChain, draws: int, seed: int) -> Iterator[Matrix]:
     """T in every draw: where it is given, draws differ by chance alone."""
     for number in range(draws):
         if chain.posterior is None:
-            yield chain.T
+            yield chain.operator
         else:
             yield chain.posterior.draw(keyed(seed, Purpose.POSTERIOR, number))
 

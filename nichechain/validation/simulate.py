@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
-from scipy import sparse
 
 from nichechain.births import NONE
 from nichechain.chain.model import Matrix, NicheChain
+from nichechain.coverage import entries
 from nichechain.errors import NichechainError
 
 Ints = NDArray[np.int64]
@@ -141,7 +141,7 @@ class RowSampler:
     """
 
     def __init__(self, matrix: Matrix) -> None:
-        rows = sparse.csr_array(matrix, copy=True)
+        rows = entries(matrix).copy()
         rows.eliminate_zeros()
         sizes = np.diff(rows.indptr)
         of = np.repeat(np.arange(rows.shape[0]), sizes)

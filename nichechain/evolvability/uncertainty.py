@@ -1,0 +1,229 @@
+"""What else leaves a niche's l-evolvability open: the prior, and which elites there happened to be.
+
+Posterior draws tell what births leave open once the prior is chosen and elites are taken for a fair
+sample of their niche. A band over priors questions the first, a bootstrap over elites the second.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nichechain.chain.base_measure import BaseMeasure
+from nichechain.chain.comparison import counts_of_families, families_of
+from nichechain.chain.counts import TransitionCounts
+from nichechain.chain.empirical_bayes import design_effect, most_likely
+from nichechain.chain.estimators import with_posterior
+from nichechain.chain.model import NicheChain
+from nichechain.chain.posterior import DirichletPosterior
+from nichechain.errors import NichechainError
+from nichechain.evolvability.averaging import DRAWS, Convention
+from nichechain.evolvability.niches import niche_evolvability
+from nichechain.randomness import Purpose, keyed
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+BandKind = Literal["prior sensitivity", "bootstrap over elites"]
+
+_INTERVAL = (0.05, 0.95)
+
+
+@dataclass(frozen=True)
+class NicheBand:
+    """l-evolvability of every niche between two bounds, and what these are bounds of.
+
+    Parameters
+    ----------
+    kind : {"prior sensitivity", "bootstrap over elites"}
+    value : (n_niches,) float64 array
+        Posterior mean under the fitted prior, in niches.
+    low, high : (n_niches,) float64 arrays
+        Smallest and largest value over the fits, or the 90 % interval of the bootstrap.
+    fits : tuple of str
+        The priors tried, the fitted one among them; empty for the bootstrap.
+    """
+
+    kind: BandKind
+    value: Floats
+    low: Floats
+    high: Floats
+    fits: tuple[str, ...] = ()
+
+
+def prior_sensitivity(
+    counts: TransitionCounts,
+    *,
+    l: int = 5,  # noqa: E741
+    lineages: int = 100,
+    convention: Convention = "definition",
+    draws: int = 20,
+    seed: int = 0,
+    factor: float = 4.0,
+) -> NicheBand:
+    """How far l-evolvability moves if the empirical-Bayes prior had been another.
+
+    Parameters
+    ----------
+    counts : TransitionCounts
+    l, lineages, convention
+        As in :func:`l_evolvability`.
+    draws : int
+        Posterior draws of T for each fit.
+    seed : int
+        Of the draws, which have the same keys under every fit.
+    factor : float
+        The strength is divided and multiplied by this, greater than 1.
+
+    Returns
+    -------
+    NicheBand
+        Of kind ``prior sensitivity``: smallest and largest value over five fits. These have a
+        smaller, the fitted and a larger strength; and the fitted strength with all that the mixture
+        gives to destination and displacement moved to the one or to the other.
+
+    Raises
+    ------
+    NichechainError
+        If an argument is out of range.
+
+    Notes
+    -----
+    Source: robust Bayesian analysis over a class of priors, Berger (1985), Statistical Decision
+    Theory and Bayesian Analysis, section 4.7. The band is no interval of a given probability. It
+    contains the error of the draws, which :attr:`NicheEvolvability.standard_error` tells.
+    """
+    if not (math.isfinite(factor) and factor > 1):
+        raise NichechainError(f"factor is {factor:g}, but must be a number greater than 1")
+    effect = design_effect(counts)
+    strength, weights = most_likely(counts, effect)
+    pooled = float(weights[:2].sum())
+    rest = float(weights[2])
+    priors = {
+        "fitted": (strength, weights),
+        f"strength / {factor:g}": (strength / factor, weights),
+        f"strength x {factor:g}": (strength * factor, weights),
+        "all destination": (strength, np.array([pooled, 0.0, rest])),
+        "all displacement": (strength, np.array([0.0, pooled, rest])),
+    }
+    values = np.array(
+        [
+            niche_evolvability(
+                _chain(counts, s, mixture, effect),
+                l=l,
+                lineages=lineages,
+                convention=convention,
+                draws=draws,
+                seed=seed,
+            ).value
+            for s, mixture in priors.values()
+        ]
+    )
+    return NicheBand("prior sensitivity", values[0], values.min(axis=0), values.max(axis=0), tuple(priors))
+
+
+def bootstrap_elites(
+    counts: TransitionCounts,
+    *,
+    resamples: int = 50,
+    l: int = 5,  # noqa: E741
+    lineages: int = 100,
+    convention: Convention = "definition",
+    draws: int = 5,
+    seed: int = 0,
+) -> NicheBand:
+    """How far l-evolvability moves if each niche had had other elites.
+
+    Parameters
+    ----------
+    counts : TransitionCounts
+        With families, which tell whose children they are.
+    resamples : int
+        At least 2.
+    l, lineages, convention
+        As in :func:`l_evolvability`.
+    draws : int
+        Posterior draws of T for each resample.
+    seed : int
+        Of resamples and draws.
+
+    Returns
+    -------
+    NicheBand
+        Of kind ``bootstrap over elites``.
+
+    Raises
+    ------
+    NichechainError
+        If an argument is out of range or births do not say whose children they are.
+
+    Notes
+    -----
+    The elites of each niche are drawn with replacement, each with all its children: Efron and
+    Tibshirani (1993), An Introduction to the Bootstrap, and for clusters Field and Welsh (2007),
+    Journal of the Royal Statistical Society B 69, 369-390. Births that do not say whose they are
+    count as elites of one child. Strength, mixture and design effect stay as all births gave them.
+
+    Resamples hold fewer different births, which lowers every value: only their spread is used. The
+    interval is the value plus the 5 % and 95 % quantiles of the resamples less their median. In a
+    niche of m elites the spread is short by √((m − 1)/m), so a niche of one elite adds none.
+    What the few draws of each resample leave open adds to the spread.
+    """
+    if resamples < 2:
+        raise NichechainError(f"resamples is {resamples}, but must be at least 2")
+    if not len(counts.families):
+        raise NichechainError(
+            "these births do not say whose children they are, so elites cannot be resampled"
+        )
+    effect = design_effect(counts)
+    strength, weights = most_likely(counts, effect)
+
+    def values(of: TransitionCounts, draws: int) -> Floats:
+        chain = _chain(of, strength, weights, effect)
+        return niche_evolvability(
+            chain, l=l, lineages=lineages, convention=convention, draws=draws, seed=seed
+        ).value
+
+    value = values(counts, DRAWS)
+    elites = _Elites(counts)
+    again = np.array(
+        [
+            values(elites.resampled(keyed(seed, Purpose.RESAMPLING, number)), draws)
+            for number in range(resamples)
+        ]
+    )
+    low, high = value + np.quantile(again, _INTERVAL, axis=0) - np.median(again, axis=0)
+    niches = len(counts.niches)
+    return NicheBand("bootstrap over elites", value, np.maximum(low, 0.0), np.minimum(high, niches))
+
+
+class _Elites:
+    """Births by the elites whose children they are, elites by their niche."""
+
+    def __init__(self, counts: TransitionCounts) -> None:
+        self._counts = counts
+        self.families_of = families_of(counts)
+        owners, number = np.unique(self.families_of[:, :2], axis=0, return_inverse=True)
+        self._elite: Ints = number.ravel().astype(np.int64)
+        # Elites come sorted by state, so those of one state have numbers in a row.
+        _, first, where, size = np.unique(
+            owners[:, 0], return_index=True, return_inverse=True, return_counts=True
+        )
+        self._first = first[where.ravel()]
+        self._size = size[where.ravel()]
+
+    def resampled(self, rng: np.random.Generator) -> TransitionCounts:
+        """Counts with as many elites in every niche, drawn from its own with replacement."""
+        drawn = self._first + rng.integers(self._size)
+        families = self.families_of.copy()
+        families[:, 3] *= np.bincount(drawn, minlength=drawn.size)[self._elite]
+        return counts_of_families(families, self._counts)
+
+
+def _chain(counts: TransitionCounts, strength: float, weights: Floats, effect: Floats) -> NicheChain:
+    posterior = DirichletPosterior(counts, BaseMeasure.pooled(counts, weights), strength, effect)
+    return with_posterior(counts, posterior, f"empirical-bayes, strength {strength:.3g}")
