@@ -19,6 +19,9 @@ Ints = NDArray[np.int64]
 # Cells of the table (repeats, niches) and walks in flight that a simulation keeps at once.
 _SIMULATION_CELLS = 8_000_000
 
+# Target niches treated together.
+_COLUMNS = 128
+
 # Above this share of nonzeros a dense product is faster than a sparse one.
 _DENSE = 0.3
 
@@ -41,7 +44,7 @@ def expected_coverage(
     lineages: ArrayLike,
     *,
     counted: int | None = None,
-    columns: int = 128,
+    columns: int = _COLUMNS,
 ) -> Floats:
     """Expected number of distinct niches that independent lineages visit: l-evolvability.
 
@@ -89,7 +92,7 @@ def visit_probabilities(
     first: LinearMap,
     generations: int,
     counted: int | None = None,
-    columns: int = 128,
+    columns: int = _COLUMNS,
 ) -> Iterator[tuple[Ints, Floats]]:
     """Probabilities h that one lineage visits each niche, a block of niches at a time.
 
@@ -106,8 +109,7 @@ def visit_probabilities(
     """
     states = transition.shape[0]
     niches = states if counted is None else counted
-    if sparse.issparse(transition) and transition.nnz > _DENSE * states**2:  # type: ignore[attr-defined]
-        transition = transition.toarray()  # type: ignore[attr-defined]
+    transition = _faster(transition)
     for start in range(0, niches, columns):
         targets = np.arange(start, min(start + columns, niches))
         hit = np.zeros((states, targets.size))
@@ -117,6 +119,54 @@ def visit_probabilities(
             # A lineage that stands on its target has visited it, wherever it goes next.
             hit[targets, targets - start] = 1.0
         yield targets, first @ hit
+
+
+def coverage_by_generation(
+    transition: LinearMap, roots: ArrayLike, generations: int, lineages: ArrayLike, counted: int
+) -> Floats:
+    """Expected niches that lineages of roots visit, for every length up to the longest.
+
+    Parameters
+    ----------
+    transition : (S, S) row-stochastic matrix
+    roots : (m,) ints
+        States that the roots stand in; generation 1 is drawn from their rows.
+    generations : int
+        The longest lineage l, at least 1.
+    lineages : (k,) ints
+        Numbers U of lineages, each at least 1.
+    counted : int
+        Only the first so many states are niches that count.
+
+    Returns
+    -------
+    (m, generations, k) float64 array
+        Entry [i, g − 1, u] is what :func:`expected_coverage` gives for g
+        generations.
+
+    Notes
+    -----
+    With first rows out of T itself, T · H_{g−1} is at once the answer for g generations and, its
+    diagonal set to 1, the H_g of the next: all lengths cost no more than the longest.
+    """
+    states = np.asarray(roots, np.int64)
+    sizes = np.asarray(lineages, np.int64)
+    check_lengths(generations, sizes.min())
+    transition = _faster(transition)
+    found = np.zeros((states.size, generations, sizes.size))
+    for start in range(0, counted, _COLUMNS):
+        targets = np.arange(start, min(start + _COLUMNS, counted))
+        hit = np.zeros((transition.shape[0], targets.size))
+        hit[targets, targets - start] = 1.0
+        for step in range(generations):
+            hit = transition @ hit
+            with np.errstate(divide="ignore"):
+                missed = np.log1p(-np.minimum(hit[states], 1.0))
+            for k, size in enumerate(sizes):
+                found[:, step, k] -= np.expm1(int(size) * missed).sum(axis=1)
+            # A lineage that stands on its target has visited it, wherever it goes next.
+            hit[targets, targets - start] = 1.0
+    return found
 
 
 def sampled_coverage(
@@ -239,6 +289,14 @@ def check_lengths(generations: int, lineages: int) -> None:
         raise NichechainError(f"l is {generations}, but a lineage has at least 1 generation")
     if lineages < 1:
         raise NichechainError(f"lineages is {lineages}, but at least 1 is needed")
+
+
+def _faster(transition: LinearMap) -> LinearMap:
+    """The matrix in the form that multiplies faster."""
+    if sparse.issparse(transition) and transition.nnz > _DENSE * transition.shape[0] ** 2:  # type: ignore[attr-defined]
+        dense: Floats = transition.toarray()  # type: ignore[attr-defined]
+        return dense
+    return transition
 
 
 def _at_least_once(probability: Floats, trials: int) -> Floats:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
@@ -64,6 +64,11 @@ class Evolvability:
     """Who evaluates an elite's offspring: a number of threads, processes:N, ray or ray://HOST:PORT."""
     format: Literal["table", "csv", "json"] = "table"
     """How to write it."""
+
+    def asked(self) -> dict[str, Any]:
+        """What every kind of score is told."""
+        names = ("l", "lineages", "method", "convention", "repeats", "draws", "seed")
+        return {name: getattr(self, name) for name in names}
 
 
 def run(arguments: Sequence[str]) -> int:
@@ -124,13 +129,7 @@ def _one(command: Evolvability, archive: Archive, chain: NicheChain) -> pd.DataF
         result = l_evolvability(
             chain,
             niche=niche,
-            l=command.l,
-            lineages=command.lineages,
-            method=command.method,
-            convention=command.convention,
-            repeats=command.repeats,
-            draws=command.draws,
-            seed=command.seed,
+            **command.asked(),
         )
     else:
         assert command.elite is not None
@@ -140,16 +139,10 @@ def _one(command: Evolvability, archive: Archive, chain: NicheChain) -> pd.DataF
             result = genotype_evolvability(
                 archive,
                 elite,
-                l=command.l,
-                lineages=command.lineages,
                 offspring=command.offspring,
                 chain=chain,
-                method=command.method,
-                convention=command.convention,
-                repeats=command.repeats,
-                draws=command.draws,
-                seed=command.seed,
                 executor=executor,
+                **command.asked(),
             )
     values = {name: value for name, value in asdict(result).items() if value is not None}
     root = {"niche": state, "index": archive.niches.label(state)}
@@ -160,16 +153,7 @@ def _best(command: Evolvability, chain: NicheChain) -> pd.DataFrame:
     """The best niches, best first."""
     from nichechain.evolvability import niche_evolvability
 
-    scores = niche_evolvability(
-        chain,
-        l=command.l,
-        lineages=command.lineages,
-        method=command.method,
-        convention=command.convention,
-        repeats=command.repeats,
-        draws=command.draws,
-        seed=command.seed,
-    )
+    scores = niche_evolvability(chain, **command.asked())
     ranking = scores.ranking(chain, min_births=command.min_births)
     if ranking.empty:
         raise NichechainError(

@@ -6,12 +6,11 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from nichechain.chain.draws import transition_draws
-from nichechain.chain.model import NicheChain, Transition
-from nichechain.chain.operator import PooledTransition
-from nichechain.coverage import check_lengths
+from nichechain.chain.model import NicheChain
+from nichechain.coverage import coverage_by_generation
 from nichechain.errors import NichechainError
 from nichechain.evolvability.averaging import ENDLESS, SATURATED
 from nichechain.niches import Niche
@@ -26,61 +25,6 @@ Ints = NDArray[np.int64]
 # Lines of up to four niches: told apart by lightness and by marker as well as by hue.
 _COLORS = (EDGE, LONG_JUMP, START, "#4a4a4a")
 _MARKERS = ("o", "s", "^", "D")
-_COLUMNS = 128
-_DENSE = 0.3
-
-
-def coverage_by_generation(
-    transition: Transition, roots: ArrayLike, generations: int, lineages: ArrayLike, counted: int
-) -> Floats:
-    """Expected niches that lineages of roots visit, for every length up to the longest.
-
-    Parameters
-    ----------
-    transition : (S, S) row-stochastic matrix
-    roots : (m,) ints
-        States that the roots stand in; generation 1 is drawn from their rows.
-    generations : int
-        The longest lineage l, at least 1.
-    lineages : (k,) ints
-        Numbers U of lineages, each at least 1.
-    counted : int
-        Only the first so many states are niches that count.
-
-    Returns
-    -------
-    (m, generations, k) float64 array
-        Entry [i, g − 1, u] is what :func:`nichechain.coverage.expected_coverage` gives for g
-        generations.
-
-    Notes
-    -----
-    With first rows out of T itself, T · H_{g−1} is at once the answer for g generations and, its
-    diagonal set to 1, the H_g of the next: all lengths cost no more than the longest.
-    """
-    states = np.asarray(roots, np.int64)
-    sizes = np.asarray(lineages, np.int64)
-    check_lengths(generations, sizes.min())
-    if (
-        not isinstance(transition, (np.ndarray, PooledTransition))
-        and transition.nnz > _DENSE * transition.shape[0] ** 2
-    ):
-        # A dense product is then the faster one.
-        transition = transition.toarray()
-    found = np.zeros((states.size, generations, sizes.size))
-    for start in range(0, counted, _COLUMNS):
-        targets = np.arange(start, min(start + _COLUMNS, counted))
-        hit = np.zeros((transition.shape[0], targets.size))
-        hit[targets, targets - start] = 1.0
-        for step in range(generations):
-            hit = transition @ hit
-            with np.errstate(divide="ignore"):
-                missed = np.log1p(-np.minimum(hit[states], 1.0))
-            for k, size in enumerate(sizes):
-                found[:, step, k] -= np.expm1(int(size) * missed).sum(axis=1)
-            # A lineage that stands on its target has visited it, wherever it goes next.
-            hit[targets, targets - start] = 1.0
-    return found
 
 
 def plot_generations(

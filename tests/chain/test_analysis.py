@@ -8,7 +8,6 @@ import sys
 import numpy as np
 import pytest
 from hypothesis import given, settings
-from hypothesis import strategies as st
 from scipy import sparse
 
 from nichechain import GridNiches, NicheChain, NichechainError, TransitionCounts, estimate
@@ -22,25 +21,7 @@ from nichechain.chain.analysis import (
     to_deeptime,
 )
 
-# 0 ⇄ 1 lead to the pair 3 ⇄ 4 and to 2, which nobody leaves; 5 leads to 0 only.
-MIXED = np.array(
-    [
-        [0.5, 0.3, 0.2, 0.0, 0.0, 0.0],
-        [0.4, 0.2, 0.0, 0.4, 0.0, 0.0],
-        [0.0, 0.0, 1.0, 0.0, 0.0, 0.0],
-        [0.0, 0.0, 0.0, 0.0, 1.0, 0.0],
-        [0.0, 0.0, 0.0, 0.25, 0.75, 0.0],
-        [1.0, 0.0, 0.0, 0.0, 0.0, 0.0],
-    ]
-)
-
-
-@st.composite
-def transitions(draw, largest=7):
-    n = draw(st.integers(1, largest))
-    row = st.lists(st.integers(0, 3), min_size=n, max_size=n).filter(any)
-    weights = np.array(draw(st.lists(row, min_size=n, max_size=n)), float)
-    return weights / weights.sum(axis=1, keepdims=True)
+from .samples import MIXED, transitions
 
 
 def _as_lists(classes):

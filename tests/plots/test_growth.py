@@ -4,9 +4,9 @@ from matplotlib.figure import Figure
 from scipy import sparse
 
 import nichechain as nc
-from nichechain.coverage import expected_coverage
+from nichechain.coverage import coverage_by_generation, expected_coverage
 from nichechain.errors import NichechainError
-from nichechain.plots.growth import coverage_by_generation, plot_generations, plot_lineages
+from nichechain.plots.growth import plot_generations, plot_lineages
 
 
 @pytest.fixture

@@ -22,9 +22,8 @@ from scipy import sparse
 from nichechain.chain.draws import transition_draws
 from nichechain.chain.graph import LONG_JUMP
 from nichechain.chain.wormholes import wormholes
-from nichechain.coverage import check_lengths
+from nichechain.coverage import check_lengths, coverage_by_generation
 from nichechain.errors import NichechainError
-from nichechain.plots.growth import coverage_by_generation
 
 if TYPE_CHECKING:
     from nichechain.archive import Archive
