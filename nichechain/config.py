@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import operator
-from dataclasses import asdict, dataclass, fields
+from dataclasses import MISSING, asdict, dataclass, fields
 from typing import Any, Literal, get_args
 
 from nichechain.errors import NichechainError
@@ -93,15 +93,18 @@ class BuildConfig:
 
     @classmethod
     def from_json(cls, values: dict[str, Any]) -> BuildConfig:
-        """The configuration that :meth:`to_json` wrote.
+        """The configuration that :meth:`to_json` wrote, now or in an earlier version.
 
         Raises
         ------
         NichechainError
-            If a value is missing or unknown.
+            If a value is unknown, or one is missing that has no default.
         """
         names = {field.name for field in fields(cls)}
-        if set(values) != names:
-            odd = ", ".join(sorted(set(values) ^ names))
-            raise NichechainError(f"the configuration has missing or unknown values: {odd}")
+        needed = {field.name for field in fields(cls) if field.default is MISSING}
+        odd = (set(values) - names) | (needed - set(values))
+        if odd:
+            raise NichechainError(
+                f"the configuration has missing or unknown values: {', '.join(sorted(odd))}"
+            )
         return cls(**values)

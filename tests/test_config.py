@@ -62,11 +62,17 @@ def test_values_out_of_range(change: dict[str, Any], message: str) -> None:
 
 def test_json_with_values_missing_or_unknown() -> None:
     values = ARM.to_json()
-    del values["seed"]
-    with pytest.raises(NichechainError, match="missing or unknown values: seed"):
+    del values["domain"]
+    with pytest.raises(NichechainError, match="missing or unknown values: domain"):
         BuildConfig.from_json(values)
     with pytest.raises(NichechainError, match="missing or unknown values: speed"):
         BuildConfig.from_json({**ARM.to_json(), "speed": 1})
+
+
+def test_a_value_that_an_earlier_version_did_not_know_is_its_default() -> None:
+    values = dataclasses.replace(ARM, seed=BuildConfig.seed).to_json()
+    del values["seed"]
+    assert BuildConfig.from_json(values) == dataclasses.replace(ARM, seed=BuildConfig.seed)
 
 
 def test_is_immutable() -> None:
