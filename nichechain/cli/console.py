@@ -21,7 +21,10 @@ _LINE_EVERY = 10.0
 
 
 def parse(
-    command: Callable[..., Command], arguments: Sequence[str], default: Command | None = None
+    command: Callable[..., Command],
+    arguments: Sequence[str],
+    default: Command | None = None,
+    name: str | None = None,
 ) -> Command:
     """Read a command's options; exits with status 2 and a message if they are not well-formed.
 
@@ -31,10 +34,12 @@ def parse(
     arguments : sequence of str
     default : instance, optional
         Values of the options that are not given.
+    name : str, optional
+        What the command is called, by default as its class.
     """
     import tyro
 
-    name = command.__name__.lower()
+    name = name or command.__name__.lower()
     given = {} if default is None else {"default": default}
     read: Command = tyro.cli(command, prog=f"nichechain {name}", args=list(arguments), **given)  # type: ignore[call-overload]
     return read
@@ -148,6 +153,53 @@ def _lines(total: int) -> Callable[[Progress], None]:
         )
 
     return tell
+
+
+@contextmanager
+def counting(total: int, what: str) -> Iterator[Callable[[int], None]]:
+    """A progress bar with rate and time left, for anything that is counted; lines where it cannot be drawn.
+
+    Parameters
+    ----------
+    total : int
+        How many there will be.
+    what : str
+        Of what, such as ``evaluations``.
+    """
+    from rich import progress
+    from rich.console import Console
+
+    shown = Console(stderr=True)
+    clock = _Clock()
+    if not shown.is_terminal:
+        last = time.monotonic()
+
+        def line(done: int) -> None:
+            nonlocal last
+            clock.begin(done)
+            if time.monotonic() - last >= _LINE_EVERY:
+                last = time.monotonic()
+                left = clock.seconds_left(done, total)
+                text = f"{done} of {total} {what}, {clock.rate(done)}/s, {left:.0f} s left"
+                print(text, file=sys.stderr, flush=True)
+
+        yield line
+        return
+    columns = (
+        progress.BarColumn(bar_width=None),
+        progress.MofNCompleteColumn(),
+        progress.TextColumn(f"{what}, {{task.fields[rate]}}/s"),
+        progress.TimeRemainingColumn(compact=True),
+        progress.TextColumn("left"),
+    )
+    with progress.Progress(*columns, console=shown) as bar:
+        task = bar.add_task("", total=total, rate="-")
+
+        def draw(done: int) -> None:
+            clock.begin(done)
+            bar.update(task, completed=done, rate=clock.rate(done))
+
+        yield draw
 
 
 class _Clock:

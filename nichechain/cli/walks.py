@@ -1,0 +1,255 @@
+"""``nichechain walks``: what evolutionary pressure and the diversity metric do to evolvability."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal, get_args
+
+import tyro
+
+from nichechain.cli import console
+from nichechain.errors import NichechainError
+from nichechain.experiments.conditions import Condition, MetricName, Mode
+from nichechain.experiments.studies import (
+    LEVELS,
+    METRICS,
+    Kind,
+    Study,
+    metric_conditions,
+    pressure_conditions,
+    variations,
+)
+
+if TYPE_CHECKING:
+    from nichechain.domains import Domain
+
+_HELP = """usage: nichechain walks STUDY ...
+
+Walks on a behavior landscape, many of each kind, measured at every step and compared.
+
+studies:
+  pressure DOMAIN     does stronger selection for diversity raise evolvability?
+  metrics DOMAIN      does it matter which diversity metric is selected for?
+  sensitivity DOMAIN  does it matter how a parameter is set that the paper leaves open?
+
+and of a study that was begun:
+  resume PATH         go on with it, perhaps to more runs
+  report PATH         its tables, tests, figure and report, as far as it is
+
+nichechain walks STUDY --help tells a study's options.
+
+try:
+  nichechain walks pressure arm --runs 20 --out pressure"""
+
+
+@dataclass(frozen=True)
+class _Walks:
+    """What the studies share."""
+
+    domain: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="DOMAIN")]
+    """What to walk on: fetch (Fetch Pick and Place), arm (a planar arm, in seconds), ..."""
+    out: Annotated[Path, tyro.conf.arg(metavar="DIR")]
+    """Folder of the study: walks, tables, figure and report."""
+    runs: int = 50
+    """Walks of each kind."""
+    offspring: int = Condition.offspring
+    """Children of a state in each step."""
+    mutation: str = Condition.mutation
+    """Mutation operator: cauchy, gaussian, student-t or uniform-ball."""
+    scale: float = Condition.scale
+    """Scale of the mutation."""
+    k: int = Condition.k
+    """Neighbours of the kNN metrics."""
+    bandwidth: float = Condition.bandwidth
+    """Smoothing parameter of the KDE metric."""
+    mode: Mode = Condition.mode
+    """What it multiplies: the covariance of the behaviors, or nothing (a length in units of behavior)."""
+    decay: float = Condition.decay
+    """Discount of the KDE metric by age, a factor per step."""
+    archive_limit: int = Condition.archive_limit
+    """Behaviors that a novelty archive holds at most."""
+    archive_scope: Literal["walk", "configuration"] = Condition.archive_scope
+    """Whether each walk has a novelty archive of its own, or all of a kind share one."""
+    other_niche: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
+    """Only a child in another niche than its parent may follow."""
+    initialisation: str = Condition.initialisation
+    """First genotypes: domain, domain:S, normal:S, uniform:S, xavier-normal, ..., or elites:PATH."""
+    grid: Annotated[str, tyro.conf.arg(metavar="NXxNY")] = "20x20"
+    """Cells of the grid that coverage is measured on."""
+    bounds: Annotated[str | None, console.option("X0,X1,Y0,Y1", "the domain's")] = None
+    """Its bounds, in units of behavior."""
+    paired: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
+    """Run r of every kind starts from the same genotype; the test is then Friedman's."""
+    seed: int = 0
+    """Seed of the study."""
+    domain_seed: int = 0
+    """Seed of what the domain holds fixed (fetch: where block and target begin)."""
+    workers: Annotated[str | None, console.option("WORKERS", "one thread per processor")] = None
+    """Who evaluates: a number of threads, processes:N, ray or ray://HOST:PORT. The result is the same."""
+
+    def base(self, metric: MetricName = "knn") -> Condition:
+        """What all conditions share."""
+        shared = {field.name: getattr(self, field.name) for field in fields(self) if field.name in _SHARED}
+        return Condition(label="base", metric=metric, **shared)
+
+
+_SHARED = {field.name for field in fields(Condition)} - {"label", "level", "metric"}
+
+
+@dataclass(frozen=True)
+class Pressure(_Walks):
+    """Walks under rising evolutionary pressure, from random to highly selective."""
+
+    levels: str = ",".join(LEVELS)
+    """Levels of pressure: selective, random, and the best share of the offspring that may follow."""
+    steps: int = 50
+    """Steps T of a walk, of T + 1 states."""
+    metric: MetricName = "knn"
+    """Diversity that is selected for."""
+
+    def conditions(self) -> tuple[Condition, ...]:
+        """One for each level."""
+        return pressure_conditions(_words(self.levels), self.base(self.metric))
+
+
+@dataclass(frozen=True)
+class Metrics(_Walks):
+    """Highly selective walks, each kind selecting for another diversity metric."""
+
+    metrics: str = ",".join(METRICS)
+    """Diversity metrics."""
+    steps: int = 100
+    """Steps T of a walk, of T + 1 states."""
+    level: str = "selective"
+    """Pressure: selective, random, or the best share of the offspring that may follow."""
+
+    def conditions(self) -> tuple[Condition, ...]:
+        """One for each metric."""
+        return metric_conditions(_words(self.metrics), replace(self.base(), level=self.level))
+
+
+@dataclass(frozen=True)
+class Sensitivity(_Walks):
+    """Highly selective walks, each kind with another value of one parameter."""
+
+    vary: Literal["scale", "bandwidth-mode", "decay", "k", "offspring", "initialisation"] = "scale"
+    """The parameter that is varied."""
+    steps: int = 50
+    """Steps T of a walk; 0 measures where walks begin, which is all that initialisation needs."""
+    level: str = "selective"
+    """Pressure: selective, random, or the best share of the offspring that may follow."""
+    metric: MetricName = "knn"
+    """Diversity that is selected for; bandwidth-mode and decay are parameters of kde, and use it."""
+
+    def conditions(self) -> tuple[Condition, ...]:
+        """One for each value."""
+        return variations(self.vary, replace(self.base(self.metric), level=self.level))
+
+
+@dataclass(frozen=True)
+class Resume:
+    """Go on with a study that was begun."""
+
+    path: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="PATH")]
+    """Folder of the study."""
+    runs: Annotated[int | None, console.option("INT", "as many as were asked for")] = None
+    """Walks of each kind."""
+    workers: Annotated[str | None, console.option("WORKERS", "one thread per processor")] = None
+    """Who evaluates: a number of threads, processes:N, ray or ray://HOST:PORT. The result is the same."""
+
+
+@dataclass(frozen=True)
+class Report:
+    """Tables, tests, figure and report of a study that was walked, or is being walked."""
+
+    path: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="PATH")]
+    """Folder of the study."""
+
+
+def run(arguments: Sequence[str]) -> int:
+    """Walk a study, then report on it."""
+    if not arguments or arguments[0] in ("-h", "--help"):
+        print(_HELP)
+        return 0
+    verb, rest = arguments[0], arguments[1:]
+    if verb == "report":
+        return _report(console.parse(Report, rest, name="walks report").path)
+    if verb == "resume":
+        return _resume(console.parse(Resume, rest, name="walks resume"))
+    if verb == "pressure":
+        return _begin(console.parse(Pressure, rest, name="walks pressure"), "pressure")
+    if verb == "metrics":
+        return _begin(console.parse(Metrics, rest, name="walks metrics"), "metrics")
+    if verb == "sensitivity":
+        return _begin(console.parse(Sensitivity, rest, name="walks sensitivity"), "sensitivity")
+    raise NichechainError(
+        f"there is no study {verb!r}: it must be one of {', '.join(get_args(Kind))}, resume or report"
+    )
+
+
+def _begin(command: Pressure | Metrics | Sensitivity, kind: Kind) -> int:
+    from nichechain import domains
+
+    domain = domains.make(command.domain, seed=command.domain_seed)
+    return _walk(_study(command, kind, domain), domain, command.out, command.workers)
+
+
+def _resume(command: Resume) -> int:
+    from nichechain import domains
+    from nichechain.experiments.running import read_study
+
+    study = read_study(command.path)
+    if command.runs is not None:
+        study = replace(study, runs=command.runs)
+    domain = domains.make(study.domain, seed=study.domain_seed)
+    return _walk(study, domain, command.path, command.workers)
+
+
+def _walk(study: Study, domain: Domain, folder: Path, workers: str | None) -> int:
+    from nichechain import execution
+    from nichechain.experiments import running
+
+    with execution.make(workers) as executor:
+        with console.spinner("loading the domain"):
+            domain.evaluate(domain.sample(1, seed=0))
+        try:
+            with console.counting(study.evaluations, "evaluations") as tell:
+                running.run(study, folder, executor, domain=domain, on_progress=tell)
+        except KeyboardInterrupt:
+            console.console().print(
+                f"Stopped; every finished step is kept. To go on:\n  nichechain walks resume {folder}"
+            )
+            return 130
+    return _report(folder)
+
+
+def _report(folder: Path) -> int:
+    raise NotImplementedError
+
+
+def _words(text: str) -> list[str]:
+    return [word.strip() for word in text.split(",") if word.strip()]
+
+
+def _study(command: Pressure | Metrics | Sensitivity, kind: Kind, domain: Domain) -> Study:
+    """What is asked for, checked."""
+    from nichechain.niches import parse_bounds, parse_shape
+
+    shape = parse_shape(command.grid)
+    axes = len(domain.behavior_names)
+    if len(shape) != axes:
+        raise NichechainError(f"--grid is {command.grid!r}, but {command.domain} has {axes} axes of behavior")
+    return Study(
+        kind=kind,
+        domain=command.domain,
+        conditions=command.conditions(),
+        runs=command.runs,
+        steps=command.steps,
+        shape=shape,
+        bounds=domain.bounds if command.bounds is None else parse_bounds(command.bounds),
+        domain_seed=command.domain_seed,
+        seed=command.seed,
+        paired=command.paired,
+    )

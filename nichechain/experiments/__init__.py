@@ -1,0 +1,35 @@
+"""Experiments on walks: what pressure and diversity metric do to evolvability, run, tested and reported."""
+
+from __future__ import annotations
+
+from nichechain.experiments.conditions import Condition, condition_seed, pressure_of, selection_of
+from nichechain.experiments.initialisation import initialise
+from nichechain.experiments.running import read_births, read_records, read_study, run
+from nichechain.experiments.studies import (
+    LEVELS,
+    METRICS,
+    VARIATIONS,
+    Study,
+    metric_conditions,
+    pressure_conditions,
+    variations,
+)
+
+__all__ = [
+    "LEVELS",
+    "METRICS",
+    "VARIATIONS",
+    "Condition",
+    "Study",
+    "condition_seed",
+    "initialise",
+    "metric_conditions",
+    "pressure_conditions",
+    "pressure_of",
+    "read_births",
+    "read_records",
+    "read_study",
+    "run",
+    "selection_of",
+    "variations",
+]
