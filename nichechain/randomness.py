@@ -43,12 +43,18 @@ class Purpose(IntEnum):
     """A birth in a lineage without selection; index: its elite, lineage and generation."""
     PREDICTION = 13
     """Lineages simulated on a draw of T; index: the draw."""
+    CONDITION = 14
+    """Seed of the runs of one condition of a study; index: a checksum of its label."""
     FOLDS = 20
     """Which elites are held out together."""
     THINNING = 21
     """Which births are left out to see what fewer would have told; index: the repeat."""
     RESAMPLING = 22
     """Runs or elites drawn with replacement; index: the resample."""
+    VERIFICATION = 23
+    """Which elites (index 0) and which births (index 1) of an archive are evaluated again."""
+    TESSELLATION = 30
+    """Uniform samples that a Voronoi tessellation is made of."""
 
 
 def keyed(seed: int, purpose: Purpose, index: int = 0) -> np.random.Generator:
