@@ -10,7 +10,7 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from nichechain import domains
+    from nichechain import diversity, domains, experiments, landscape, variation, walks
     from nichechain.archive import Archive, Elite, load
     from nichechain.building import build
     from nichechain.chain import NicheChain, TransitionCounts, estimate
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     )
     from nichechain.execution import Threads
     from nichechain.niches import GridNiches
+    from nichechain.walks import walk
 
 __version__ = "0.1.0"
 
@@ -53,7 +54,10 @@ _HOMES = {
     "load": "archive",
     "niche_evolvability": "evolvability",
     "prior_sensitivity": "evolvability",
+    "walk": "walks",
 }
+
+_PACKAGES = ("diversity", "domains", "experiments", "landscape", "variation", "walks")
 
 __all__ = [
     "Archive",
@@ -70,19 +74,25 @@ __all__ = [
     "TransitionCounts",
     "bootstrap_elites",
     "build",
+    "diversity",
     "domains",
     "estimate",
+    "experiments",
     "genotype_evolvability",
     "l_evolvability",
+    "landscape",
     "load",
     "niche_evolvability",
     "prior_sensitivity",
+    "variation",
+    "walk",
+    "walks",
 ]
 
 
 def __getattr__(name: str) -> Any:
-    if name == "domains":
-        return importlib.import_module("nichechain.domains")
+    if name in _PACKAGES:
+        return importlib.import_module(f"nichechain.{name}")
     if name in _HOMES:
         return getattr(importlib.import_module(f"nichechain.{_HOMES[name]}"), name)
     raise AttributeError(f"module 'nichechain' has no attribute {name!r}")

@@ -9,15 +9,20 @@ import sys
 from collections.abc import Sequence
 
 COMMANDS = {
+    "domains": "what can be searched",
     "build": "fill an archive: MAP-Elites that records who was born where",
     "info": "what is in an archive, and what made it",
     "evolvability": "l-evolvability of niches, or of an elite",
+    "landscape": "sensitivity, evolvability and dissimila of the elites of an archive",
+    "walks": "walks under pressure and with other metrics, tested and reported",
     "estimate": "the estimate of T, how well it foretells births, and whether they are enough",
     "compare": "l-evolvability, reach and coverage of one archive against another",
+    "verify": "whether an archive is what its seed and its domain make of it",
     "merge": "archives of one domain, niches and mutation as one",
     "import": "births of another program's search, from CSV or Parquet",
     "plot": "heat maps of an archive and graphs of which niches lead to which",
     "explore": "a page on which one clicks a niche and sees where its descendants go",
+    "sweep": "how many niches a grid should have",
     "validate": "whether the chain is one, and whether its predictions come true",
 }
 

@@ -82,6 +82,14 @@ def facts(rows: dict[str, str]) -> Table:
     return made
 
 
+def leave_at_next_interrupt() -> None:
+    """Have Ctrl-C end the process at once: all is kept, and only a rollout is still waited for."""
+    import os
+    import signal
+
+    signal.signal(signal.SIGINT, lambda *_: os._exit(130))
+
+
 def spinner(text: str) -> Any:
     """Something that turns while a thing is loaded; nothing where there is no terminal."""
     from rich.console import Console
@@ -226,4 +234,63 @@ class _Clock:
     def seconds_left(self, births: int, total: int) -> float:
         """Time that the rest will take at this speed."""
         speed = self._speed(births)
-        return (total - births) / speed if speed else float("inf")
+        return (total - births) / speed if speed else 0.0 if births >= total else float("inf")
+
+
+@contextmanager
+def stages() -> Iterator[Callable[[str, int, int], None]]:
+    """A bar for each stage of some work, on standard error; plain lines where that is no terminal.
+
+    Yields
+    ------
+    callable
+        Told the stage, and how many of how many are done.
+    """
+    from rich import progress
+    from rich.console import Console
+
+    shown = Console(stderr=True)
+    if not shown.is_terminal:
+        yield _stage_lines()
+        return
+    columns = (
+        progress.TextColumn("{task.description}"),
+        progress.BarColumn(bar_width=None),
+        progress.MofNCompleteColumn(),
+        progress.TextColumn("{task.fields[rate]}/s"),
+        progress.TimeRemainingColumn(compact=True),
+        progress.TextColumn("left"),
+    )
+    with progress.Progress(*columns, console=shown) as bar:
+        tasks: dict[str, progress.TaskID] = {}
+        clocks: dict[str, _Clock] = {}
+
+        def tell(stage: str, done: int, total: int) -> None:
+            if stage not in tasks:
+                tasks[stage] = bar.add_task(stage, total=total, rate="-")
+                clocks[stage] = _Clock()
+                clocks[stage].begin(done)
+            bar.update(tasks[stage], completed=done, rate=clocks[stage].rate(done))
+
+        yield tell
+
+
+def _stage_lines() -> Callable[[str, int, int], None]:
+    clocks: dict[str, _Clock] = {}
+    last = time.monotonic()
+
+    def tell(stage: str, done: int, total: int) -> None:
+        nonlocal last
+        clock = clocks.setdefault(stage, _Clock())
+        clock.begin(done)
+        if time.monotonic() - last < _LINE_EVERY:
+            return
+        last = time.monotonic()
+        left = clock.seconds_left(done, total)
+        print(
+            f"{stage}: {done} of {total}, {clock.rate(done)}/s, {left:.0f} s left",
+            file=sys.stderr,
+            flush=True,
+        )
+
+    return tell

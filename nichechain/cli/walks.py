@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
@@ -222,11 +223,73 @@ def _walk(study: Study, domain: Domain, folder: Path, workers: str | None) -> in
                 f"Stopped; every finished step is kept. To go on:\n  nichechain walks resume {folder}"
             )
             return 130
-    return _report(folder)
+    return _report(folder, domain)
 
 
-def _report(folder: Path) -> int:
-    raise NotImplementedError
+def _report(folder: Path, domain: Domain | None = None) -> int:
+    """Write the report of what is walked so far, and tell what it found."""
+    from nichechain import domains
+    from nichechain.experiments.findings import find
+    from nichechain.experiments.report import FILES, write_report
+    from nichechain.experiments.running import read_records, read_study
+
+    study = read_study(folder)
+    records = read_records(folder, study)
+    domain = domain or domains.make(study.domain, seed=study.domain_seed)
+    with console.spinner("testing and drawing"):
+        analysis = write_report(
+            folder, study, records, command=command_of(study, domain, folder), unit=domain.unit
+        )
+    found = console.table("claim", "paper", "here", "verdict")
+    for column in found.columns[1:]:
+        column.justify = "left"
+    for finding in find(analysis):
+        found.add_row(finding.claim, finding.paper, finding.ours, finding.verdict)
+    shown = console.console()
+    if found.row_count:
+        shown.print(found)
+    finished = [analysis.finished.get(condition.label, 0) for condition in study.conditions]
+    least, most = min(finished), max(finished)
+    runs = f"{least}" if least == most else f"{least} to {most}"
+    shown.print(f"{runs} of {study.runs} runs of each kind, {analysis.evaluations} evaluations. Written:")
+    for name in FILES:
+        shown.print(f"  {folder / name}")
+    return 0
+
+
+def command_of(study: Study, domain: Domain, folder: Path) -> str:
+    """The command line that asks for a study."""
+    from nichechain.experiments.studies import LEVELS, METRICS, VARIATIONS
+
+    base = study.conditions[0]
+    labels = [condition.label for condition in study.conditions]
+    options = {"runs": str(study.runs), "steps": str(study.steps)}
+    varied = "level" if study.kind == "pressure" else "metric"
+    if study.kind == "pressure" and labels != list(LEVELS):
+        options["levels"] = ",".join(labels)
+    if study.kind == "metrics" and labels != list(METRICS):
+        options["metrics"] = ",".join(labels)
+    if study.kind == "sensitivity":
+        varied = base.label.partition(" ")[0]
+        options["vary"] = next(name for name, change in VARIATIONS.items() if varied in change)
+    flags = ["paired"] if study.paired else []
+    for field in fields(Condition)[1:]:
+        value = getattr(base, field.name)
+        if field.name != varied and value != field.default:
+            if value is True:
+                flags.append(field.name)
+            else:
+                options[field.name] = str(value)
+    if study.shape != (20,) * len(study.shape):
+        options["grid"] = "x".join(map(str, study.shape))
+    if study.bounds != domain.bounds:
+        options["bounds"] = ",".join(repr(bound) for pair in study.bounds for bound in pair)
+    for name in ("seed", "domain_seed"):
+        if getattr(study, name):
+            options[name] = str(getattr(study, name))
+    words = [f"--{name.replace('_', '-')} {shlex.quote(value)}" for name, value in options.items()]
+    words += [f"--{name.replace('_', '-')}" for name in flags]
+    return " ".join(["nichechain walks", study.kind, study.domain, *words, "--out", shlex.quote(str(folder))])
 
 
 def _words(text: str) -> list[str]:

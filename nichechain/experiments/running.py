@@ -130,7 +130,9 @@ def run(
         for block in _blocks_to_walk(folder, study, finished):
             _walk(block, study, domain, folder, executor, lambda n, d=done: _tell(on_progress, d + n))  # type: ignore[misc]
             done += block.evaluations(study.steps)
-        (folder / _RUNNING).unlink(missing_ok=True)
+        # What is no longer under way, and what a crash left half-written.
+        for path in (folder / _RUNNING, *folder.glob("**/*.tmp")):
+            path.unlink(missing_ok=True)
 
 
 def read_study(folder: str | Path) -> Study:

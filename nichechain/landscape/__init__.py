@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from nichechain.landscape.archives import OFFSPRING, Correlation, Landscape, measure_archive
 from nichechain.landscape.behaviors import (
     EPSILON,
     dissimila_ratio,
@@ -17,23 +18,41 @@ from nichechain.landscape.behaviors import (
 )
 from nichechain.landscape.dissimila import QUANTILES, Dissimila, find_dissimila
 from nichechain.landscape.genotypes import LandscapeMeasures, measure, measure_all, niches_of
+from nichechain.landscape.measures import (
+    MEASURES,
+    Measure,
+    Measures,
+    find_measure,
+    find_measures,
+    measure_behaviors,
+)
 
 __all__ = [
     "EPSILON",
+    "MEASURES",
+    "OFFSPRING",
     "QUANTILES",
+    "Correlation",
     "Dissimila",
+    "Landscape",
     "LandscapeMeasures",
+    "Measure",
+    "Measures",
     "dissimila_ratio",
     "evolvability",
     "expected_evolvability",
     "expected_global_sensitivity",
     "expected_local_sensitivity",
     "find_dissimila",
+    "find_measure",
+    "find_measures",
     "global_sensitivity",
     "hull_volume",
     "local_sensitivity",
     "measure",
     "measure_all",
+    "measure_archive",
+    "measure_behaviors",
     "niches_of",
     "one_hot_evolvability",
     "population_evolvability",

@@ -11,22 +11,14 @@ from numpy.typing import ArrayLike, NDArray
 from nichechain.births import NONE
 from nichechain.domains.base import Domain, Evaluation, check_genotypes
 from nichechain.errors import NichechainError
-from nichechain.landscape.behaviors import (
-    EPSILON,
-    dissimila_ratio,
-    evolvability,
-    expected_evolvability,
-    expected_local_sensitivity,
-    hull_volume,
-    local_sensitivity,
-    one_hot_evolvability,
-)
+from nichechain.landscape.behaviors import EPSILON
+from nichechain.landscape.measures import check_sample_size, measure_behaviors
 from nichechain.randomness import Purpose, keyed
 from nichechain.variation import Mutation
 
 if TYPE_CHECKING:
     from nichechain.execution import Executor
-    from nichechain.niches import GridNiches
+    from nichechain.niches import Niches
 
 
 @dataclass(frozen=True)
@@ -71,7 +63,7 @@ def measure(
     seed: int = 0,
     executor: Executor | None = None,
     *,
-    niches: GridNiches | None = None,
+    niches: Niches | None = None,
     epsilon: float = EPSILON,
 ) -> LandscapeMeasures:
     """All local measures of one genotype (P,); the rest is as in :func:`measure_all`."""
@@ -89,7 +81,7 @@ def measure_all(
     seed: int = 0,
     executor: Executor | None = None,
     *,
-    niches: GridNiches | None = None,
+    niches: Niches | None = None,
     epsilon: float = EPSILON,
 ) -> tuple[LandscapeMeasures, ...]:
     """All local measures of several genotypes, evaluated as one batch.
@@ -106,7 +98,7 @@ def measure_all(
         which genotypes are measured together. They share the noise of their i-th children.
     executor : Executor, optional
         Where to evaluate; by default here.
-    niches : GridNiches, optional
+    niches : Niches, optional
         For one-hot evolvability.
     epsilon : float
         As in :func:`dissimila_ratio`.
@@ -121,42 +113,44 @@ def measure_all(
         If the genotypes have the wrong length, one of them fails, or the sample is too small.
     """
     parents = check_genotypes(genotypes, domain.genotype_length)
-    if sample_size < 2:
-        raise NichechainError(f"sample_size is {sample_size}, but evolvability needs at least 2 offspring")
-    children = [mutate(p, keyed(seed, Purpose.OFFSPRING, i)) for p in parents for i in range(sample_size)]
-    batch = np.concatenate([parents, np.stack(children)])
+    check_sample_size(sample_size)
+    batch = np.concatenate([parents, make_offspring(parents, mutate, sample_size, seed)])
     evaluation = domain.evaluate(batch) if executor is None else executor.evaluate(domain, batch)
     count = len(parents)
     for number in np.flatnonzero(evaluation.failed[:count]):
         raise NichechainError(f"genotype {number} failed to evaluate: {evaluation.reasons[number]}")
     parent, offspring = np.split(evaluation.behavior, [count])
-    offspring = offspring.reshape(count, sample_size, -1)
-    widest, mean = evolvability(offspring), expected_evolvability(offspring)
-    farthest, away = local_sensitivity(parent, offspring), expected_local_sensitivity(parent, offspring)
-    ratio, expected = dissimila_ratio(widest, farthest, epsilon), dissimila_ratio(mean, away, epsilon)
-    failed = evaluation.failed[count:].reshape(count, sample_size).sum(axis=1)
-    covered: list[float] | None = None
-    if niches is not None:
-        landed = niches_of(evaluation, niches)[count:].reshape(count, sample_size)
-        covered = one_hot_evolvability(landed, len(niches)).tolist()
+    offspring = offspring.reshape(count, sample_size, parent.shape[1])
+    found = measure_behaviors(parent, offspring, niches, epsilon=epsilon)
     return tuple(
         LandscapeMeasures(
             sample_size,
-            int(failed[g]),
-            float(farthest[g]),
-            float(away[g]),
-            float(widest[g]),
-            float(mean[g]),
-            None if covered is None else covered[g],
-            float(ratio[g]),
-            float(expected[g]),
-            hull_volume(offspring[g]),
+            int(found.failed[g]),
+            float(found.local_sensitivity[g]),
+            float(found.expected_local_sensitivity[g]),
+            float(found.evolvability[g]),
+            float(found.expected_evolvability[g]),
+            None if niches is None else float(found.one_hot_evolvability[g]),
+            float(found.ratio[g]),
+            float(found.expected_ratio[g]),
+            float(found.hull_volume[g]),
         )
         for g in range(count)
     )
 
 
-def niches_of(evaluation: Evaluation, niches: GridNiches | None) -> NDArray[np.int64]:
+def make_offspring(
+    parents: NDArray[np.float32], mutate: Mutation, sample_size: int, seed: int
+) -> NDArray[np.float32]:
+    """Children to measure (G·n, P), those of the first parent first.
+
+    The i-th child of every parent (G, P) is made with the same noise, whatever else is measured.
+    """
+    children = [mutate(p, keyed(seed, Purpose.OFFSPRING, i)) for p in parents for i in range(sample_size)]
+    return np.stack(children) if children else np.empty((0, parents.shape[1]), np.float32)
+
+
+def niches_of(evaluation: Evaluation, niches: Niches | None) -> NDArray[np.int64]:
     """State of each evaluated genotype (N,): ``births.NONE`` where it failed or nothing is gridded."""
     state = np.full(len(evaluation), NONE, np.int64)
     if niches is not None:

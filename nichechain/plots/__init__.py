@@ -10,9 +10,11 @@ from nichechain.plots.reach import plot_reach
 from nichechain.plots.reachability import plot_reachability
 from nichechain.plots.stability import plot_stability
 from nichechain.plots.uncertainty import plot_uncertainty
+from nichechain.plots.walks import draw_study, plot_runs, plot_walks
 from nichechain.plots.wormholes import plot_wormholes
 
 __all__ = [
+    "draw_study",
     "plot_calibration",
     "plot_classes",
     "plot_elites",
@@ -22,11 +24,13 @@ __all__ = [
     "plot_reach",
     "plot_reachability",
     "plot_reached",
+    "plot_runs",
     "plot_stability",
     "plot_transitions",
     "plot_transitions_by_class",
     "plot_uncertainty",
     "plot_visits",
+    "plot_walks",
     "plot_wormholes",
     "write_explorer",
 ]

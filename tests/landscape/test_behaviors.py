@@ -1,21 +1,19 @@
-"""Landscape measures: against closed forms, brute force and laws; of genotypes."""
+"""Landscape measures of behaviors: against closed forms, brute force and laws."""
 
 from __future__ import annotations
 
 import itertools
 import math
+from fractions import Fraction
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from nichechain import NichechainError, domains, landscape, variation
+from nichechain import NichechainError, landscape
 from nichechain.births import NONE
-from nichechain.execution import Threads
-from nichechain.niches import GridNiches
-from nichechain.randomness import Purpose, keyed
 
 PARENT = np.array([0.0, 0.0])
 SQUARE = np.array([[1.0, 1.0], [1.0, -1.0], [-1.0, 1.0], [-1.0, -1.0]])
@@ -153,24 +151,6 @@ def test_the_ratio_reaches_2_only_for_offspring_on_both_sides():
     assert landscape.dissimila_ratio(0.0, 0.0) == 0.0
 
 
-def test_dissimila_are_the_smallest_ratios_that_are_not_neutral():
-    ratio = np.array([0.0, 1.0, 0.2, 1.5, 0.4, 1.2, 0.9, 1.1, 0.8, 1.3, np.nan])
-    sensitivity = np.array([0.0, *[0.1] * 10])
-    found = landscape.find_dissimila(ratio, sensitivity, share=0.25)
-    # Nine points are judged: a quarter of them is reached by the third.
-    assert np.flatnonzero(found.dissimila).tolist() == [2, 4, 8]
-    assert found.threshold == 0.8
-    assert np.flatnonzero(found.neutral).tolist() == [0]
-    np.testing.assert_allclose(found.quantiles, np.quantile(ratio[1:10], landscape.QUANTILES))
-
-
-def test_a_set_of_neutral_points_has_no_dissimila():
-    found = landscape.find_dissimila([0.0, 0.0], [0.0, 1e-12])
-    assert found.neutral.all()
-    assert not found.dissimila.any()
-    assert np.isnan(found.threshold)
-
-
 @pytest.mark.parametrize(
     ("points", "volume"),
     [
@@ -192,67 +172,39 @@ def test_hull_volume(points, volume):
     assert landscape.hull_volume(points) == pytest.approx(volume, rel=1e-6, abs=0.0)
 
 
-def test_measures_of_a_genotype_are_those_of_its_children():
-    domain, mutate = domains.make("arm"), variation.gaussian(0.3)
-    genotype = domain.sample(1, seed=3)[0]
-    niches = GridNiches((6, 6), domain.bounds)
-    found = landscape.measure(domain, genotype, mutate, 12, 5, niches=niches)
-    children = np.stack([mutate(genotype, keyed(5, Purpose.OFFSPRING, i)) for i in range(12)])
-    parent = domain.evaluate(genotype[None]).behavior[0]
-    offspring = domain.evaluate(children).behavior
-    assert found.sample_size == 12
-    assert found.failed == 0
-    assert found.local_sensitivity == pytest.approx(max(np.linalg.norm(offspring - parent, axis=1)))
-    assert found.expected_evolvability == landscape.expected_evolvability(offspring)
-    assert found.one_hot_evolvability == len(set(niches.of(offspring).tolist())) / 36
-    assert found.ratio == pytest.approx(found.evolvability / found.local_sensitivity)
-    assert found.expected_ratio == pytest.approx(
-        found.expected_evolvability / found.expected_local_sensitivity
-    )
-    assert found.hull_volume == landscape.hull_volume(offspring)
+@given(st.lists(st.tuples(st.integers(-3, 3), st.integers(-3, 3)), min_size=1, max_size=9), st.booleans())
+def test_the_area_of_a_hull_is_that_of_its_corners(points, tilted):
+    # Points of a small lattice are often equal, or on one line.
+    turn = np.array([[0.6, -0.8], [0.8, 0.6]]) if tilted else np.eye(2)
+    area = landscape.hull_volume(np.array(points, float) @ turn)
+    assert area == pytest.approx(float(_area(points)), abs=1e-12)
 
 
-def test_measures_depend_neither_on_company_nor_on_workers():
-    domain, mutate = domains.make("arm"), variation.cauchy()
-    genotypes = domain.sample(5, seed=0)
-    together = landscape.measure_all(domain, genotypes, mutate, 8, 1)
-    assert together[3] == landscape.measure(domain, genotypes[3], mutate, 8, 1)
-    domain.chunk = 7
-    with Threads(2) as threads:
-        assert landscape.measure_all(domain, genotypes, mutate, 8, 1, threads) == together
+def _area(points):
+    """Area of a convex hull, exactly: corners by Andrew's monotone chain, then the shoelace formula."""
 
+    def half(ordered):
+        chain = []
+        for x, y in ordered:
+            while len(chain) > 1 and (chain[-1][0] - chain[-2][0]) * (y - chain[-2][1]) <= (
+                chain[-1][1] - chain[-2][1]
+            ) * (x - chain[-2][0]):
+                chain.pop()
+            chain.append((x, y))
+        return chain[:-1]
 
-@settings(max_examples=10)
-@given(st.integers(0, 100))
-def test_children_that_fail_are_counted_and_left_out(seed):
-    domain = domains.make("arm")
-
-    def fragile(parent, rng):
-        return np.full_like(parent, np.inf) if rng.random() < 0.5 else variation.gaussian()(parent, rng)
-
-    found = landscape.measure(domain, domain.sample(1, seed=0)[0], fragile, 20, seed)
-    lost = sum(keyed(seed, Purpose.OFFSPRING, i).random() < 0.5 for i in range(20))
-    assert found.failed == lost
-    assert found.evolvability <= 2 * found.local_sensitivity * (1 + 1e-14)
+    ordered = sorted(set(points))
+    corners = half(ordered) + half(ordered[::-1])
+    pairs = zip(corners, corners[1:] + corners[:1], strict=True)
+    return Fraction(sum(a * d - b * c for (a, b), (c, d) in pairs), 2)
 
 
 @pytest.mark.parametrize(
     ("call", "message"),
     [
         (lambda: landscape.dissimila_ratio(1.0, 1.0, 0.0), "epsilon is 0.0"),
-        (lambda: landscape.find_dissimila([1.0], [1.0], share=0.0), "share is 0.0"),
-        (lambda: landscape.find_dissimila([1.0], [1.0], share=1.5), "share is 1.5"),
-        (lambda: landscape.find_dissimila([1.0], [1.0], neutral=-1.0), "neutral is -1.0"),
-        (lambda: landscape.find_dissimila([1.0], [1.0, 2.0]), r"shapes \(1,\) and \(2,\)"),
-        (lambda: _measure(np.zeros(9)), r"shape \(1, 9\), but must be \(N, 10\)"),
-        (lambda: _measure(np.zeros(10), 1), "sample_size is 1"),
-        (lambda: _measure(np.full(10, np.nan)), "genotype 0 failed to evaluate: genotype is not finite"),
     ],
 )
 def test_bad_input_is_one_sentence(call, message):
     with pytest.raises(NichechainError, match=message):
         call()
-
-
-def _measure(genotype, sample_size=5):
-    return landscape.measure(domains.make("arm"), genotype, variation.cauchy(), sample_size)

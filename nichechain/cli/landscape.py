@@ -1,0 +1,357 @@
+"""``nichechain landscape``: sensitivity, evolvability and dissimila of the elites of an archive."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import tyro
+
+from nichechain.cli import console
+from nichechain.config import BuildConfig, MutationName
+from nichechain.errors import NichechainError
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from nichechain.archive import Archive
+    from nichechain.landscape import Landscape, Measure
+
+TABLES = (".csv", ".parquet")
+_NO_MAPS = "none"
+_MOST_AXES = 2
+
+
+@dataclass(frozen=True)
+class LandscapeCommand:
+    """Measure the behavior landscape around every elite of an archive, by samples of its offspring."""
+
+    path: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="PATH")]
+    """Archive folder, or the name of an archive that ships with nichechain."""
+    offspring: int = 30
+    """Sample size: offspring of each elite. Measures of different sizes do not compare."""
+    mutation: Annotated[MutationName | None, console.option("NAME", "the archive's own")] = None
+    """Operator that makes them: cauchy, gaussian, student-t or uniform-ball."""
+    scale: Annotated[float | None, console.option("FLOAT", "the archive's own")] = None
+    """Scale of the mutation."""
+    step_bound: Annotated[str | None, console.option("KIND:SIZE", "the archive's own")] = None
+    """Bound the neighbourhood: per-coordinate:SIZE (truncated), rescaled:SIZE (of a whole step), or none."""
+    elites: Annotated[int | None, console.option("INT", "all")] = None
+    """Measure so many elites, drawn at random; a larger sample holds a smaller one."""
+    share: float = 0.1
+    """Quantile of r* up to which an elite is a dissimilum."""
+    l: int = 5  # noqa: E741  # the paper's name
+    """Generations, for the l-evolvability that the measures are compared with."""
+    lineages: int = 100
+    """Lineages, for l-evolvability."""
+    min_births: int = 20
+    """Niches with fewer births behind their row of T are not compared."""
+    top: int = 10
+    """Rows to print; the table has them all."""
+    by: str = "expected-evolvability"
+    """Measure that they are sorted by."""
+    lowest: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
+    """Print the lowest instead of the highest."""
+    map: Annotated[str | None, console.option("NAME,NAME,...", "r, r*, LS, LS*, η and η*")] = None
+    """Measures to draw, such as expected-ratio,hull-volume; none draws nothing."""
+    seed: int = 0
+    """Seed of the offspring, of the sample of elites and of posterior draws."""
+    workers: Annotated[str | None, console.option("WORKERS", "one thread per processor")] = None
+    """Who evaluates: a number of threads, processes:N, ray or ray://HOST:PORT. The result is the same."""
+    out: Annotated[Path | None, console.option("FILE", "NAME-landscape.csv")] = None
+    """Table to write, .csv or .parquet; beside it the summary (.json) and the maps (.png)."""
+    resume: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
+    """Go on with an interrupted measurement."""
+    force: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
+    """Start an interrupted measurement over."""
+    json: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
+    """Print summary and rows as JSON."""
+
+
+def run(arguments: Sequence[str]) -> int:
+    """Measure, write, and say what came of it."""
+    command = console.parse(LandscapeCommand, arguments, name="landscape")
+    from nichechain import execution
+    from nichechain.archive import load
+    from nichechain.coverage import check_lengths
+    from nichechain.landscape import find_measure, find_measures, measure_archive
+    from nichechain.landscape.measures import check_sample_size
+    from nichechain.variation import SelfAdaptiveDomain, configured
+
+    check_sample_size(command.offspring)
+    check_lengths(command.l, command.lineages)
+    for name in ("top", "min_births"):
+        if getattr(command, name) < 0:
+            option = name.replace("_", "-")
+            raise NichechainError(f"--{option} is {getattr(command, name)}, but must not be negative")
+    by = find_measure(command.by)
+    if command.map is not None and command.map != _NO_MAPS:
+        find_measures(command.map.split(","))
+    archive = load(command.path)
+    out = command.out or Path(f"{archive.folder.name}-landscape.csv")
+    _check_out(out)
+    keep = out.with_name(f"{out.name}.partial")
+    if command.resume and command.force:
+        raise NichechainError("--resume and --force exclude each other: go on, or start over")
+    if keep.exists() and not command.resume:
+        if not command.force:
+            raise NichechainError(
+                f"{keep} holds an interrupted measurement: --resume goes on with it, --force starts over"
+            )
+        keep.unlink()
+    # Step sizes that are genes come with the archive's own domain; an operator is of the weights' one.
+    domain = archive.domain
+    weights = domain.domain if isinstance(domain, SelfAdaptiveDomain) else domain
+    _, mutate = configured(_config(command, archive), weights)
+    measured = len(archive.elites) if command.elites is None else min(command.elites, len(archive.elites))
+    total = measured * (1 + command.offspring)
+    done = 0
+    shown = console.console()
+    with execution.make(command.workers) as executor:
+        try:
+            with console.counting(total, "evaluations") as tell:
+
+                def count(more: int) -> None:
+                    nonlocal done
+                    done += more
+                    tell(done)
+
+                found = measure_archive(
+                    archive,
+                    command.offspring,
+                    command.seed,
+                    executor,
+                    mutate=mutate,
+                    elites=command.elites,
+                    share=command.share,
+                    keep=keep,
+                    on_done=count,
+                )
+        except KeyboardInterrupt:
+            # What is printed for people must not spoil what a program reads.
+            if not command.json:
+                kept = f"what is measured is kept in {keep}. To go on, add --resume."
+                shown.print(f"Stopped; {kept if keep.exists() else 'nothing is measured yet.'}")
+            return 130
+    frame, summary = _results(command, archive, found)
+    written = _write(command, archive, found, frame, summary, out)
+    keep.unlink(missing_ok=True)
+    rows = _top(command, frame, by)
+    if command.json:
+        records = json.loads(rows.to_json(orient="records", double_precision=15))
+        print(json.dumps({**summary, "elites": records}, indent=2))
+        return 0
+    _show(command, archive, found, summary, rows, by)
+    shown.print(f"wrote {', '.join(written)}")
+    return 0
+
+
+def _check_out(out: Path) -> None:
+    if out.suffix.lower() not in TABLES:
+        raise NichechainError(f"--out is {str(out)!r}, but must end in one of {', '.join(TABLES)}")
+    if not out.parent.is_dir():
+        raise NichechainError(f"--out is {str(out)!r}, but there is no folder {out.parent}")
+    if out.is_dir():
+        raise NichechainError(f"--out is {str(out)!r}, but that is a folder, not a file")
+    if not os.access(out.parent, os.W_OK):
+        raise NichechainError(f"--out is {str(out)!r}, but nothing can be written to {out.parent}")
+
+
+def _config(command: LandscapeCommand, archive: Archive) -> BuildConfig:
+    """The archive's configuration, with the mutation that is asked for."""
+    from nichechain.variation.configured import parse_step_bound
+
+    config = archive.config
+    if command.mutation is not None and command.mutation != config.mutation:
+        config = replace(config, mutation=command.mutation, df=None)
+    if command.scale is not None:
+        if config.self_adaptive:
+            raise NichechainError(
+                f"--scale is {command.scale:g}, but the step sizes of {archive.folder.name} are genes, "
+                "which every elite has its own of"
+            )
+        config = replace(config, scale=command.scale)
+    if command.step_bound == "none":
+        config = replace(config, step_bound=None)
+    elif command.step_bound is not None:
+        config = replace(config, step_bound=parse_step_bound(command.step_bound))
+    return config
+
+
+def _results(
+    command: LandscapeCommand, archive: Archive, found: Landscape
+) -> tuple[pd.DataFrame, dict[str, Any]]:
+    """The table, with what births say of each niche beside it, and the summary."""
+    import numpy as np
+
+    from nichechain.evolvability import niche_evolvability
+
+    chain = archive.chain()
+    with console.spinner("l-evolvability of the niches"):
+        scores = niche_evolvability(chain, l=command.l, lineages=command.lineages, seed=command.seed)
+    assert scores.births is not None
+    compared = np.where(scores.births >= command.min_births, scores.value, np.nan)
+    inside = found.state < len(archive.niches)
+    births, value = np.full(len(found), np.nan), np.full(len(found), np.nan)
+    births[inside], value[inside] = scores.births[found.state[inside]], compared[found.state[inside]]
+    frame = found.frame()
+    frame["births_of_niche"] = births
+    frame["births_of_niche"] = frame["births_of_niche"].astype("Int64")
+    frame["l_evolvability"] = value
+    config = _config(command, archive)
+    bound = config.step_bound
+    summary: dict[str, Any] = {
+        "archive": archive.folder.name,
+        "mutation": config.mutation,
+        "scale": config.scale,
+        "step_bound": None if bound is None else f"{bound[0]}:{bound[1]:g}",
+        **found.summary(),
+        "l_evolvability": {
+            "l": scores.l,
+            "lineages": scores.lineages,
+            "convention": scores.convention,
+            "estimator": scores.estimator,
+            "min_births": command.min_births,
+            "saturated": scores.saturated,
+            "spearman": [
+                {"measure": c.measure, "rho": _finite(c.rho), "p_value": _finite(c.p_value), "n": c.n}
+                for c in found.correlations(compared)
+            ],
+        },
+    }
+    return frame, summary
+
+
+def _write(
+    command: LandscapeCommand,
+    archive: Archive,
+    found: Landscape,
+    frame: pd.DataFrame,
+    summary: dict[str, Any],
+    out: Path,
+) -> list[str]:
+    """Table, summary and maps; the names of the files."""
+    import io
+
+    from nichechain.files import write_atomically
+
+    if out.suffix.lower() == ".csv":
+        table = frame.to_csv(index=False, float_format="%.9g").encode()
+    else:
+        buffer = io.BytesIO()
+        frame.to_parquet(buffer, index=False)
+        table = buffer.getvalue()
+    about = out.with_suffix(".json")
+    files = {out: table, about: (json.dumps(summary, indent=2) + "\n").encode()}
+    if command.map != _NO_MAPS and len(found.behavior_names) <= _MOST_AXES:
+        files[out.with_suffix(".png")] = _draw(command, archive, found)
+    for path, content in files.items():
+        write_atomically(path, content)
+    return [str(path) for path in files]
+
+
+def _draw(command: LandscapeCommand, archive: Archive, found: Landscape) -> bytes:
+    import io
+
+    from matplotlib.figure import Figure
+
+    from nichechain.plots.landscape import MAPS, plot_landscape
+
+    figure = Figure()
+    plot_landscape(archive, found, figure, MAPS if command.map is None else command.map.split(","))
+    buffer = io.BytesIO()
+    figure.savefig(buffer, dpi=110, bbox_inches="tight", pad_inches=0.15)
+    return buffer.getvalue()
+
+
+def _top(command: LandscapeCommand, frame: pd.DataFrame, by: Measure) -> pd.DataFrame:
+    """The rows to print. Those that a measure says nothing about come last, whichever end is asked for."""
+    ranked = frame
+    if by.name in ("ratio", "expected_ratio"):
+        ranked = frame[~frame["neutral"]]
+    return ranked.sort_values(by.name, ascending=command.lowest, kind="stable").head(command.top)
+
+
+def _show(
+    command: LandscapeCommand,
+    archive: Archive,
+    found: Landscape,
+    summary: dict[str, Any],
+    rows: pd.DataFrame,
+    by: Measure,
+) -> None:
+    from nichechain.landscape import MEASURES
+
+    shown = console.console()
+    unit = f" {found.unit}" if found.unit else ""
+    of_all = f" of {len(archive.elites)}" if len(found) < len(archive.elites) else ""
+    made = f"{summary['mutation']} mutation of "
+    made += "self-adaptive scale" if archive.config.self_adaptive else f"scale {summary['scale']:g}"
+    if summary["step_bound"]:
+        made += f", bounded {summary['step_bound']}"
+    shown.print(f"[bold]Behavior landscape[/] of {len(found)}{of_all} elites of {archive.folder.name}")
+    shown.print(f"[dim]each by {found.sample_size} offspring; {made}; seed {found.seed}[/]")
+    if not found.bounded:
+        shown.print("[dim]neighbourhoods are unbounded, so LS, GS and η are lower bounds[/]")
+    failed = summary["failed"]
+    flagged, quantiles = summary["dissimila"], summary["expected_ratio_quantiles"]
+    facts = {
+        "global sensitivity GS": f"{_number(summary['global_sensitivity'])}{unit}",
+        "expected, GS*": f"{_number(summary['expected_global_sensitivity'])} ± "
+        f"{_number(summary['expected_global_sensitivity_error'])}{unit}",
+        "r* at quantiles": ", ".join(f"{_number(value)} ({level})" for level, value in quantiles.items()),
+        "dissimila": f"{flagged['count']}, r* ≤ {_number(flagged['threshold'])}",
+        "neutral elites": str(summary["neutral"]),
+        "failed offspring": f"{failed} of {len(found) * found.sample_size}",
+    }
+    shown.print(console.facts(facts))
+    if len(rows):
+        names = [name for name in MEASURES if name not in ("ratio", "hull_volume")]
+        if by.name not in names:
+            names[0] = by.name
+        which = "Lowest" if command.lowest else "Highest"
+        table = console.table(
+            "niche",
+            *(MEASURES[name].symbol for name in names),
+            f"{command.l}-ev.",
+            "",
+            title=f"{which} {by.title}, {by.symbol}",
+        )
+        for row in rows.to_dict("records"):
+            flag = "dissimilum" if row["dissimilum"] else "neutral" if row["neutral"] else ""
+            table.add_row(
+                str(row["index"]),
+                *(_number(row[name]) for name in names),
+                _number(row["l_evolvability"]),
+                flag,
+            )
+        shown.print(table)
+    compared = summary["l_evolvability"]
+    table = console.table(
+        "measure", "Spearman", "p", "n", title=f"With {compared['l']}-evolvability of the niche"
+    )
+    for entry in compared["spearman"]:
+        p_value = "-" if entry["p_value"] is None else f"{entry['p_value']:.2g}"
+        measure = MEASURES[entry["measure"]]
+        table.add_row(f"{measure.title}, {measure.symbol}", _number(entry["rho"]), p_value, str(entry["n"]))
+    shown.print(table)
+    shown.print(
+        f"[dim]{compared['lineages']} lineages; convention: {compared['convention']}; estimator: "
+        f"{compared['estimator']}; niches of {compared['min_births']} births or more[/]"
+    )
+    if compared["saturated"]:
+        shown.print(
+            "Nearly all niches that can be reached are: fewer --lineages would tell niches apart better."
+        )
+
+
+def _number(value: float | None) -> str:
+    return "-" if value is None or value != value else f"{value:.3g}"
+
+
+def _finite(value: float) -> float | None:
+    return value if value == value else None
