@@ -18,7 +18,8 @@ from nichechain.config import BuildConfig
 from nichechain.domains.base import Domain
 from nichechain.errors import ArchiveError, NichechainError
 from nichechain.illumination import Elites
-from nichechain.niches import GridNiches, Niche
+from nichechain.niches import Niche, Niches
+from nichechain.trust import check_trusted
 
 if TYPE_CHECKING:
     from torch import nn
@@ -31,7 +32,7 @@ class Elite:
     Parameters
     ----------
     niche : tuple of int, optional
-        Grid index of its niche; None for the elite of the outside state.
+        Index of its niche; None for the elite of the outside state.
     state : int
         Flat id of its niche.
     genotype : (P,) float32 array
@@ -70,13 +71,13 @@ class Archive:
     def __init__(self, folder: Path, domain: Domain | None = None) -> None:
         self.folder = folder
         self._domain = domain
-        self.meta = store.read_meta(folder)
+        self.meta, state = store.read_commit(folder)
         self.config: BuildConfig = self.meta.config
-        self.niches = GridNiches(self.config.shape, self.config.bounds, self.config.outside)
-        self.elites: Elites = store.read_state(folder, self.meta).elites
+        self.niches: Niches = store.read_niches(folder, self.meta)
+        self.elites: Elites = state.elites
 
     def __repr__(self) -> str:
-        if self.meta.imported:
+        if self.meta.imported and not len(self.elites):
             return f"Archive({str(self.folder)!r}: {self.meta.births} imported births)"
         return (
             f"Archive({str(self.folder)!r}: {self.filled} of {len(self.niches)} niches filled "
@@ -101,7 +102,7 @@ class Archive:
             raise ArchiveError(
                 f"{self.folder} was imported, so nothing can be evaluated: its domain is not known"
             )
-        domain = self._domain or domains.make(self.config.domain, seed=self.config.domain_seed)
+        domain, _ = self._search
         length = self.elites.genotype.shape[1]
         if domain.genotype_length != length:
             raise NichechainError(
@@ -111,7 +112,7 @@ class Archive:
         return domain
 
     @cached_property
-    def mutate(self) -> variation.AdditiveMutation:
+    def mutate(self) -> variation.Mutation:
         """The mutation operator that the archive was built with.
 
         Raises
@@ -123,7 +124,15 @@ class Archive:
             raise ArchiveError(
                 f"{self.folder} was imported, so nothing can be mutated: its operator is not known"
             )
-        return variation.make(self.config.mutation, self.config.scale)
+        return self._search[1]
+
+    @cached_property
+    def _search(self) -> tuple[Domain, variation.Mutation]:
+        """Domain and mutation, which may depend on each other."""
+        if self._domain is None:
+            check_trusted(self.config, self.folder)
+        domain = self._domain or domains.of(self.config)
+        return variation.configured(self.config, domain)
 
     def elite(self, niche: Niche) -> Elite:
         """The elite of a niche.
@@ -133,7 +142,7 @@ class Archive:
         NichechainError
             If there is no such niche, or nobody was ever born in it.
         """
-        if self.meta.imported:
+        if self.meta.imported and not len(self.elites):
             raise ArchiveError(f"{self.folder} was imported, so it has births but no elites")
         state = self.niches.flat(niche)
         row = np.searchsorted(self.elites.niche, state)
@@ -155,6 +164,12 @@ class Archive:
     def controller(self, niche: Niche) -> nn.Module:
         """The elite of a niche as a torch module, ready to use."""
         return self.domain.controller(self.elite(niche).genotype)
+
+    def to_ribs(self) -> Any:
+        """The elites as an archive of pyribs, see :func:`nichechain.pyribs.to_ribs`."""
+        from nichechain.pyribs import to_ribs
+
+        return to_ribs(self)
 
     def births(self) -> pd.DataFrame:
         """Every evaluated child, in order; the columns of :mod:`nichechain.births`."""

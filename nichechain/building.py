@@ -11,14 +11,17 @@ import numpy as np
 import pyarrow as pa
 
 from nichechain import domains, store, variation
-from nichechain.config import BuildConfig
+from nichechain.config import MOST_FAILED, BuildConfig
 from nichechain.domains.base import Domain
 from nichechain.errors import ArchiveError
 from nichechain.execution import Executor
+from nichechain.failures import Failures, check_first_batch
 from nichechain.illumination import MapElites
-from nichechain.niches import GridNiches
+from nichechain.niches import make as make_niches
+from nichechain.selection import CuriosityScores
 
 CHECKPOINT_SECONDS = 30.0
+_COMMIT_SHARE = 0.01
 
 
 @dataclass(frozen=True)
@@ -48,11 +51,16 @@ def build(
     *,
     domain: Domain | None = None,
     on_progress: Callable[[Progress], None] | None = None,
+    max_failed: float = MOST_FAILED,
 ) -> None:
     """Fill an archive folder, going on from what it holds.
 
-    Commits every half minute, at the end, and when interrupted. What it leaves behind depends on
-    the configuration alone: not on interruptions, nor on the executor.
+    Commits every half minute, or less often if that would take more than a hundredth of the time,
+    at the end, and when interrupted. What it leaves behind depends on the configuration alone: not
+    on interruptions, nor on the executor.
+
+    A birth whose evaluation raises, or that no worker outlives, is recorded as failed with its
+    reason, and the build goes on.
 
     Parameters
     ----------
@@ -63,33 +71,43 @@ def build(
     domain : Domain, optional
         By default the one that the configuration names.
     on_progress : callable, optional
+    max_failed : float
+        Share of births that may fail, from 0 to 1, once there are a hundred.
 
     Raises
     ------
     ArchiveError
         If the folder holds an archive of another configuration or larger budget, is damaged, or
-        is being written.
+        is being written, or cannot be written to. The last commit is then whole.
     NichechainError
-        If the domain is unknown or no initial birth can be a parent.
+        If the domain is unknown, all first births fail, no initial birth can be a parent, or more
+        births fail than may; what there is by then is committed.
     """
+    failures = Failures(max_failed)
     folder = Path(folder)
-    niches = GridNiches(config.shape, config.bounds, config.outside)
-    domain = domain or domains.make(config.domain, seed=config.domain_seed)
-    mutate = variation.make(config.mutation, config.scale)
+    domain = domain or domains.of(config)
+    domain, mutate = variation.configured(config, domain)
     with store.writing(folder):
-        state = None
-        outside = failed = 0
+        state = scores = None
+        outside = 0
         if store.is_archive(folder):
             meta = store.read_meta(folder)
             if meta.origin is not None:
                 raise ArchiveError(f"{folder} was {meta.origin['kind']}, so no build can go on with it")
             _check_continues(meta.config, config, meta.births, folder)
+            niches = store.read_niches(folder, meta)
             state = store.read_state(folder, meta)
-            rows = store.read_births(folder, meta)
+            curious = config.selection == "curiosity"
+            rows = store.read_births(folder, meta, None if curious else ["child_niche", "failed"])
+            if curious:
+                scores = CuriosityScores.of_births(rows)
             outside = _count(rows, len(niches))
-            failed = rows["failed"].length() - rows["failed"].null_count
-        search = MapElites(domain, niches, mutate, config, state)
-        writer = store.Writer(folder, config, store.DomainFacts.of(domain))
+            failures.count(rows)
+            del rows
+        else:
+            niches = make_niches(config)
+        search = MapElites(domain, niches, mutate, config, state, scores)
+        writer = store.Writer(folder, config, store.DomainFacts.of(domain), niches=niches)
 
         under_way = 0
 
@@ -97,21 +115,31 @@ def build(
             nonlocal under_way
             under_way += done
             if on_progress is not None:
-                on_progress(Progress(search.births + under_way, search.filled, outside, failed))
+                on_progress(Progress(search.births + under_way, search.filled, outside, failures.failed))
 
         last_commit = time.monotonic()
+        pause = CHECKPOINT_SECONDS
         tell()
         try:
             while search.births < config.evaluations:
+                failures.check(
+                    f"{folder} keeps them, and --resume with a larger --max-failed goes on from there"
+                )
+                first = search.births == 0
                 rows = search.advance(executor, config.evaluations - search.births, tell)
                 under_way = 0
+                if first:
+                    check_first_batch(rows, domain, config.seed)
                 writer.append(rows)
                 outside += _count(rows, len(niches))
-                failed += rows["failed"].length() - rows["failed"].null_count
+                failures.count(rows)
                 tell()
-                if time.monotonic() - last_commit > CHECKPOINT_SECONDS:
+                if time.monotonic() - last_commit > pause:
+                    began = time.monotonic()
                     writer.commit(search.state)
                     last_commit = time.monotonic()
+                    # Many large genotypes take a while to write.
+                    pause = max(CHECKPOINT_SECONDS, (last_commit - began) / _COMMIT_SHARE)
         finally:
             # An interrupt between two halves of a step leaves nothing to commit; the last commit
             # is at most half a minute old.

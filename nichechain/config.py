@@ -2,15 +2,24 @@
 
 from __future__ import annotations
 
+import math
 import operator
-from dataclasses import MISSING, asdict, dataclass, fields
-from typing import Any, Literal, get_args
+from collections.abc import Mapping
+from dataclasses import MISSING, asdict, dataclass, field, fields
+from typing import Any, Literal, TypeAlias, get_args
 
 from nichechain.errors import NichechainError
 
 Replacement = Literal["random", "first", "newest", "objective"]
 Outside = Literal["state", "absorb", "clip"]
+NichesKind = Literal["grid", "cvt"]
+DomainOption: TypeAlias = str | int | float | bool
 MutationName = Literal["cauchy", "gaussian", "student-t", "uniform-ball"]
+StepBound = Literal["per-coordinate", "rescaled"]
+Selection = Literal["uniform", "curiosity"]
+
+MOST_FAILED = 0.5
+"""Share of births that may fail before a run is stopped, unless told otherwise."""
 
 
 @dataclass(frozen=True)
@@ -26,9 +35,9 @@ class BuildConfig:
     evaluations : int
         Births in total, the initial ones among them.
     shape : tuple of int
-        Cells of the grid along each axis of behavior.
+        Cells of the grid along each axis of behavior; of a tessellation, its one number of niches.
     bounds : tuple of (float, float)
-        Bounds of the grid, in units of behavior.
+        Bounds of the niches along each axis, in units of behavior.
     outside : {"state", "absorb", "clip"}
         What a behavior out of bounds belongs to, see :class:`nichechain.niches.GridNiches`.
     initial : int
@@ -44,6 +53,24 @@ class BuildConfig:
         with the largest objective.
     seed : int
         Seed of the run.
+    niches : {"grid", "cvt"}
+        Equal cells, or a Voronoi tessellation, see :class:`nichechain.niches.CVTNiches`.
+    niches_seed : int
+        Seed of a tessellation, apart from that of the run, so that runs can share their niches.
+    domain_options : mapping of str to str, int, float or bool
+        What else :func:`nichechain.domains.make` is told of the domain.
+    df : float, optional
+        Degrees of freedom of student-t, by default 3.
+    step_bound : ({"per-coordinate", "rescaled"}, float), optional
+        Makes N(θ) a bounded set, see :class:`nichechain.variation.Bound`.
+    layer_scales : tuple of float
+        Factor on the scale in each layer of the controller; by default all weights are alike.
+    self_adaptive : bool
+        Whether step sizes are genes, which mutate too and are used before the weights: one per
+        layer that has a layer scale, or else one for all weights. They begin at the scale.
+    selection : {"uniform", "curiosity"}
+        How parents are drawn from the elites: each alike, or in proportion to the curiosity score,
+        see :mod:`nichechain.selection`.
 
     Raises
     ------
@@ -63,9 +90,17 @@ class BuildConfig:
     scale: float = 1.0
     replacement: Replacement = "random"
     seed: int = 0
+    niches: NichesKind = "grid"
+    niches_seed: int = 0
+    domain_options: Mapping[str, DomainOption] = field(default_factory=dict, hash=False)
+    df: float | None = None
+    step_bound: tuple[StepBound, float] | None = None
+    layer_scales: tuple[float, ...] = ()
+    self_adaptive: bool = False
+    selection: Selection = "uniform"
 
     def __post_init__(self) -> None:
-        for name in ("evaluations", "initial", "batch", "seed", "domain_seed"):
+        for name in ("evaluations", "initial", "batch", "seed", "domain_seed", "niches_seed"):
             try:
                 # Numbers of NumPy become plain ones, which JSON can hold.
                 object.__setattr__(self, name, operator.index(getattr(self, name)))
@@ -76,15 +111,34 @@ class BuildConfig:
         object.__setattr__(self, "shape", tuple(int(cells) for cells in self.shape))
         object.__setattr__(self, "bounds", tuple((float(low), float(high)) for low, high in self.bounds))
         object.__setattr__(self, "scale", float(self.scale))
+        object.__setattr__(self, "domain_options", _plain_options(self.domain_options))
+        object.__setattr__(self, "layer_scales", tuple(float(scale) for scale in self.layer_scales))
+        if self.df is not None:
+            object.__setattr__(self, "df", float(self.df))
+        if self.step_bound is not None:
+            kind, size = self.step_bound
+            object.__setattr__(self, "step_bound", (kind, float(size)))
         for name in ("evaluations", "initial", "batch"):
             if getattr(self, name) < 1:
                 raise NichechainError(f"{name} is {getattr(self, name)}, but must be at least 1")
-        for name in ("seed", "domain_seed"):
+        for name in ("seed", "domain_seed", "niches_seed"):
             if getattr(self, name) < 0:
                 raise NichechainError(f"{name} is {getattr(self, name)}, but must not be negative")
         if self.replacement not in get_args(Replacement):
             raise NichechainError(
                 f"replacement is {self.replacement!r}, but must be one of {', '.join(get_args(Replacement))}"
+            )
+        if self.niches not in get_args(NichesKind):
+            raise NichechainError(
+                f"niches is {self.niches!r}, but must be one of {', '.join(get_args(NichesKind))}"
+            )
+        if self.niches == "cvt" and len(self.shape) != 1:
+            raise NichechainError(
+                f"shape is {self.shape}, but a tessellation has one number of niches, such as (400,)"
+            )
+        if self.selection not in get_args(Selection):
+            raise NichechainError(
+                f"selection is {self.selection!r}, but must be one of {', '.join(get_args(Selection))}"
             )
 
     def to_json(self) -> dict[str, Any]:
@@ -101,10 +155,23 @@ class BuildConfig:
             If a value is unknown, or one is missing that has no default.
         """
         names = {field.name for field in fields(cls)}
-        needed = {field.name for field in fields(cls) if field.default is MISSING}
+        needed = {field.name for field in fields(cls) if field.default is field.default_factory is MISSING}
         odd = (set(values) - names) | (needed - set(values))
         if odd:
             raise NichechainError(
                 f"the configuration has missing or unknown values: {', '.join(sorted(odd))}"
             )
         return cls(**values)
+
+
+def _plain_options(options: Mapping[str, DomainOption]) -> dict[str, DomainOption]:
+    """Options in the order of their names, so that equal ones are written alike."""
+    if not isinstance(options, Mapping):
+        raise NichechainError(f"domain_options is {options!r}, but must map names to values")
+    for name, value in options.items():
+        fits = isinstance(value, (str, int)) or (isinstance(value, float) and math.isfinite(value))
+        if not isinstance(name, str) or not fits:
+            raise NichechainError(
+                f"domain option {name!r} is {value!r}, but must be a text, a finite number, or true or false"
+            )
+    return {name: options[name] for name in sorted(options)}

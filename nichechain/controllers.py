@@ -181,6 +181,12 @@ class MLP:
         return weights + (sum(self.sizes[1:]) if self.evolve_biases else 0)
 
     @property
+    def layers(self) -> tuple[int, ...]:
+        """Evolved parameters of each layer."""
+        pairs = zip(self.sizes, self.sizes[1:], strict=False)
+        return tuple((inputs + self.evolve_biases) * outputs for inputs, outputs in pairs)
+
+    @property
     def activations(self) -> NDArray[np.int64]:
         """Activation code of every layer."""
         return np.array([_ACTIVATIONS[name] for name in self._names], np.int64)
@@ -311,6 +317,18 @@ class ModuleController:
         self.inputs = inputs
         self.outputs = outputs
         self.genotype_length = sum(parameter.numel() for parameter in module.parameters())
+
+    @property
+    def layers(self) -> tuple[int, ...]:
+        """Parameters of each submodule that has some of its own, in the order of the genotype."""
+        met: set[int] = set()
+        sizes = []
+        for part in self._module.modules():
+            # A parameter that two submodules share is one gene, of the first.
+            own = [p for p in part.parameters(recurse=False) if id(p) not in met]
+            met.update(map(id, own))
+            sizes.append(sum(p.numel() for p in own))
+        return tuple(size for size in sizes if size)
 
     def sample(self, n: int, seed: int | np.random.Generator) -> Float32s:
         """Genotypes with Xavier normal weights, and parameters of one dimension 0.

@@ -1,6 +1,6 @@
 """MAP-Elites that remembers who was born where, and from which niche.
 
-One step: draw parents uniformly from the occupied niches, mutate, evaluate, keep. Elites live in
+One step: draw parents from the occupied niches, mutate, evaluate, keep. Elites live in
 a pyribs archive. Which birth of a niche is its elite follows one rule, *the largest key wins*,
 so the elites after N births are a function of the set of births, in whatever order they came.
 """
@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -20,8 +21,9 @@ from nichechain.config import BuildConfig
 from nichechain.domains.base import Domain, Evaluation
 from nichechain.errors import NichechainError
 from nichechain.execution import Executor
-from nichechain.niches import GridNiches
+from nichechain.niches import CVTNiches, GridNiches, Niches
 from nichechain.randomness import Purpose, keyed
+from nichechain.selection import CuriosityScores, draw_curious
 from nichechain.variation import Mutation
 
 
@@ -89,11 +91,13 @@ class MapElites:
     Parameters
     ----------
     domain : Domain
-    niches : GridNiches
+    niches : Niches
     mutate : Mutation
     config : BuildConfig
     state : SearchState, optional
         Where to go on from; by default from the start.
+    curiosity : CuriosityScores, optional
+        Scores after the births so far, where parents are selected by them and there is a state.
 
     Attributes
     ----------
@@ -103,16 +107,25 @@ class MapElites:
         The last step begun, -1 before the first.
     settled : bool
         Whether the state is that after a finished batch, not in the middle of keeping one.
+
+    Raises
+    ------
+    NichechainError
+        If a search by curiosity is given a state and no scores.
     """
 
     def __init__(
         self,
         domain: Domain,
-        niches: GridNiches,
+        niches: Niches,
         mutate: Mutation,
         config: BuildConfig,
         state: SearchState | None = None,
+        curiosity: CuriosityScores | None = None,
     ) -> None:
+        if config.selection == "curiosity" and state is not None and curiosity is None:
+            raise NichechainError("a search that selects by curiosity goes on from its scores: give them")
+        self._curiosity = curiosity or CuriosityScores()
         self._domain = domain
         self._niches = niches
         self._config = config
@@ -196,7 +209,12 @@ class MapElites:
             )
         batch = self._config.batch
         rng = keyed(self._config.seed, Purpose.SELECTION, step)
-        parents = self._archive.elites(occupied[rng.integers(len(occupied), size=batch)])
+        if self._config.selection == "curiosity":
+            scores = self._curiosity.of(self._archive.elites(occupied).uid)
+            drawn = draw_curious(scores, batch, rng)
+        else:
+            drawn = rng.integers(len(occupied), size=batch)
+        parents = self._archive.elites(occupied[drawn])
         uid = self._first_uid(step) + np.arange(batch)
         return Offspring(
             np.stack([self._child(*pair) for pair in zip(parents.genotype, uid.tolist(), strict=True)]),
@@ -227,6 +245,8 @@ class MapElites:
         )
         accepted = np.zeros(len(offspring), bool)
         accepted[fine] = self._archive.add(candidates[fine])
+        if self._config.selection == "curiosity":
+            self._curiosity.tell(offspring.parent_uid, accepted)
         return births.table(offspring, evaluation, child_niche=niche, accepted=accepted, step=self.step)
 
     def _keys(self, uid: NDArray[np.int64], objective: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -248,15 +268,13 @@ class MapElites:
 class _Archive:
     """A pyribs archive for the niches, and beside it the elite of the outside state."""
 
-    def __init__(self, domain: Domain, niches: GridNiches) -> None:
-        # Importing pyribs takes seconds, which only a search should spend.
-        from ribs.archives import GridArchive
-
+    def __init__(self, domain: Domain, niches: Niches) -> None:
         self._niches = niches
-        self._grid = GridArchive(
+        make, cells = _pyribs(niches)
+        self._grid = make(
             solution_dim=domain.genotype_length,
-            dims=niches.shape,
             ranges=niches.bounds,
+            **cells,
             solution_dtype=np.float32,
             objective_dtype=np.float64,
             measures_dtype=np.float64,
@@ -326,6 +344,20 @@ class _Archive:
         rows = np.full(len(state), len(found))
         rows[inside] = np.arange(len(found))
         return Elites.concatenate(found, self._outside)[rows]
+
+
+def _pyribs(niches: Niches) -> tuple[Any, dict[str, Any]]:
+    """The class of archive that has such niches, and what it has to be told of them."""
+    # Importing pyribs takes seconds, which only a search should spend.
+    from ribs.archives import CVTArchive, GridArchive
+
+    match niches:
+        case GridNiches():
+            return GridArchive, {"dims": niches.shape}
+        case CVTNiches():
+            return CVTArchive, {"centroids": niches.centroids}
+        case _:
+            raise NichechainError(f"niches are {niches!r}, but pyribs has an archive for grid and cvt only")
 
 
 def _no_offspring(length: int) -> Offspring:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import hashlib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -16,7 +17,7 @@ from nichechain.births import NONE, Offspring
 from nichechain.config import BuildConfig
 from nichechain.errors import ArchiveError, NichechainError
 from nichechain.illumination import Elites, SearchState
-from nichechain.niches import GridNiches
+from nichechain.niches import Niches
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -80,7 +81,7 @@ class Axes:
 def import_births(
     log: str | Path,
     folder: str | Path,
-    niches: GridNiches,
+    niches: Niches,
     *,
     columns: Columns | None = None,
     axes: Axes | None = None,
@@ -96,7 +97,7 @@ def import_births(
         A CSV file with a header, or Parquet; one row per evaluated child.
     folder : path
         Where the archive goes; it must not hold one.
-    niches : GridNiches
+    niches : Niches
     columns : Columns, optional
     axes : Axes, optional
 
@@ -108,7 +109,6 @@ def import_births(
         If the folder holds an archive.
     """
     columns, axes = columns or Columns(), axes or Axes()
-    folder = Path(folder)
     content = Path(log).read_bytes()
     table = _read(Path(log), content)
     missing = [name for name in columns.names if name not in table.column_names]
@@ -116,28 +116,66 @@ def import_births(
         raise NichechainError(f"{log} has no column {missing[0]!r}: it has {', '.join(table.column_names)}")
     if not len(table):
         raise NichechainError(f"{log} has no rows, but every birth is one")
-    dimensions = len(niches.shape)
-    facts = store.DomainFacts(_axis_names(columns, axes, dimensions), axes.unit, "objective", None)
+    if not (axes.names or isinstance(columns.child, str)):
+        axes = replace(axes, names=columns.child)
     rows = _Reader(table, niches).births(columns)
-    config = BuildConfig(
-        DOMAIN,
-        niches.shape,
-        niches.bounds,
-        evaluations=len(table),
-        outside=niches.outside,  # type: ignore[arg-type]
-    )
     origin = {
         "kind": "imported",
         "file": Path(log).name,
         "sha256": hashlib.sha256(content).hexdigest(),
         "columns": {name: value for name, value in vars(columns).items() if value is not None},
     }
+    write_archive(folder, niches, rows, origin, axes)
+
+
+def write_archive(
+    folder: str | Path,
+    niches: Niches,
+    rows: pa.Table,
+    origin: dict[str, Any],
+    axes: Axes,
+    *,
+    state: SearchState | None = None,
+    objective_name: str = "objective",
+) -> None:
+    """Make an archive of births that no build made.
+
+    Parameters
+    ----------
+    folder : path
+        Where the archive goes; it must not hold one.
+    niches : Niches
+    rows : pyarrow.Table
+        Births.
+    origin : dict
+        Where they come from: ``kind`` is ``imported``, and the rest tells of what.
+    axes : Axes
+    state : SearchState, optional
+        Elites, by default none.
+    objective_name : str
+
+    Raises
+    ------
+    NichechainError
+        If there are more or fewer names than axes.
+    ArchiveError
+        If the folder holds an archive.
+    """
+    folder = Path(folder)
+    dimensions = len(niches.bounds)
+    facts = store.DomainFacts(_axis_names(axes, dimensions), axes.unit, objective_name, None)
+    config = BuildConfig(
+        DOMAIN,
+        evaluations=len(rows),
+        replacement="random" if state is None else "objective",
+        **niches.settings(),
+    )
     with store.writing(folder):
         if store.is_archive(folder):
             raise ArchiveError(f"{folder} already holds an archive: import into another folder")
-        writer = store.Writer(folder, config, facts, origin)
+        writer = store.Writer(folder, config, facts, origin, niches=niches)
         writer.append(rows)
-        writer.commit(_nothing_to_go_on_with(len(table), dimensions))
+        writer.commit(state or _nothing_to_go_on_with(len(rows), dimensions))
 
 
 def _read(log: Path, content: bytes) -> pa.Table:
@@ -155,13 +193,11 @@ def _read(log: Path, content: bytes) -> pa.Table:
         raise NichechainError(f"{log} cannot be read as {kind[1:].upper()}: {reason}") from error
 
 
-def _axis_names(columns: Columns, axes: Axes, dimensions: int) -> tuple[str, ...]:
+def _axis_names(axes: Axes, dimensions: int) -> tuple[str, ...]:
     if axes.names:
         if len(axes.names) != dimensions:
             raise NichechainError(f"axes are {', '.join(axes.names)}, but the grid has {dimensions}")
         return axes.names
-    if not isinstance(columns.child, str):
-        return columns.child
     return tuple(f"axis_{axis}" for axis in range(dimensions))
 
 
@@ -177,11 +213,11 @@ class _Reader:
     """Reads columns of a log, and says in which row something is wrong."""
 
     table: pa.Table
-    niches: GridNiches
+    niches: Niches
 
     def births(self, columns: Columns) -> pa.Table:
         """The rows as births."""
-        size, dimensions = len(self.table), len(self.niches.shape)
+        size, dimensions = len(self.table), len(self.niches.bounds)
         parent, _ = self._states(columns.parent)
         child, behavior = self._states(columns.child)
         run = self._runs(columns.run)
@@ -234,7 +270,7 @@ class _Reader:
                     f"row {at} has {given} {state[at - 1]}, but states run from 0 to {self.niches.states - 1}"
                 )
             return state, None
-        axes = len(self.niches.shape)
+        axes = len(self.niches.bounds)
         if len(given) != axes:
             raise NichechainError(f"behavior has columns {', '.join(given)}, but the grid has {axes} axes")
         behavior = np.stack([self._numbers(name) for name in given], axis=1)

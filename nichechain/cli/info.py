@@ -50,7 +50,9 @@ def run(arguments: Sequence[str]) -> int:
         made_by = {"configuration": config.to_json(), "origin": meta.origin, "versions": meta.versions}
         print(json.dumps({**content, **made_by}, indent=2))
         return 0
-    grid = " by ".join(map(str, config.shape))
+    cells = " by ".join(map(str, config.shape))
+    if config.niches == "cvt":
+        cells = f"{cells} Voronoi cells (seed {config.niches_seed})"
     spans = ", ".join(
         f"{name} {low:g} to {high:g} {unit}" for name, (low, high) in zip(names, config.bounds, strict=True)
     )
@@ -60,9 +62,9 @@ def run(arguments: Sequence[str]) -> int:
     rows = {
         "archive": str(archive.folder),
         "births": f"{meta.births} ({state})",
-        "  outside the grid": str(content["births_outside"]),
+        "  out of bounds": str(content["births_outside"]),
         "  failed": str(content["births_failed"]),
-        "grid": f"{grid} over {spans}",
+        "grid" if config.niches == "grid" else "tessellation": f"{cells} over {spans}",
         "niches filled": f"{content['niches_filled']} of {len(archive.niches)}",
         "  never filled": str(content["niches_never_filled"]),
         "  filled, never a parent": str(content["niches_filled_never_parent"]),
@@ -86,9 +88,11 @@ def run(arguments: Sequence[str]) -> int:
 
 
 def _origin(origin: dict[str, Any]) -> dict[str, Any]:
-    """The log and the columns that were read."""
-    columns = {f"  {name}": value for name, value in origin["columns"].items()}
-    return {"file": origin["file"], "sha256": origin["sha256"], **columns}
+    """The log and the columns that were read, or the program and who its parents were."""
+    told = {name: value for name, value in origin.items() if name not in ("kind", "columns", "emitters")}
+    columns = {f"  {name}": value for name, value in origin.get("columns", {}).items()}
+    emitters = {f"  {each['emitter']}, parent": each["parent"] for each in origin.get("emitters", [])}
+    return {**told, **columns, **emitters}
 
 
 def _plain(value: Any) -> str:

@@ -1,0 +1,38 @@
+"""pyribs and nichechain: record a search of pyribs as births, and hand archives over and back.
+
+pyribs keeps elites, but not which of them a solution came from. :func:`record` notes it while a
+pyribs script runs, with three added lines::
+
+    from nichechain.pyribs import from_ribs, record   # 1
+
+    scheduler = Scheduler(archive, emitters)
+    recording = record(scheduler)                      # 2
+    for _ in range(iterations):
+        solutions = scheduler.ask()
+        scheduler.tell(*evaluate(solutions))
+
+    births = from_ribs(recording, "archives/mine")     # 3
+
+The package is written for pyribs 0.12. Of its emitters, those that draw elites are recorded as they
+are; evolution strategies follow a convention, see :class:`Recording`.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+from nichechain.pyribs.conversion import from_ribs, to_ribs
+from nichechain.pyribs.recording import Recording, record
+
+if TYPE_CHECKING:
+    from nichechain.pyribs.emitters import MutationEmitter
+
+__all__ = ["MutationEmitter", "Recording", "from_ribs", "record", "to_ribs"]
+
+
+def __getattr__(name: str) -> Any:
+    # An emitter is a class of pyribs, whose import takes seconds.
+    if name == "MutationEmitter":
+        return importlib.import_module("nichechain.pyribs.emitters").MutationEmitter
+    raise AttributeError(f"module 'nichechain.pyribs' has no attribute {name!r}")
