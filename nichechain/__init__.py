@@ -28,6 +28,9 @@ if TYPE_CHECKING:
     )
     from nichechain.execution import Threads
     from nichechain.niches import GridNiches
+    from nichechain.pyribs import from_ribs
+    from nichechain.selection import curiosity
+    from nichechain.verification import Verification, verify
     from nichechain.walks import walk
 
 __version__ = "0.1.0"
@@ -46,14 +49,18 @@ _HOMES = {
     "NichechainError": "errors",
     "Threads": "execution",
     "TransitionCounts": "chain",
+    "Verification": "verification",
     "bootstrap_elites": "evolvability",
     "build": "building",
+    "curiosity": "selection",
     "estimate": "chain",
+    "from_ribs": "pyribs",
     "genotype_evolvability": "evolvability",
     "l_evolvability": "evolvability",
     "load": "archive",
     "niche_evolvability": "evolvability",
     "prior_sensitivity": "evolvability",
+    "verify": "verification",
     "walk": "walks",
 }
 
@@ -72,12 +79,15 @@ __all__ = [
     "NichechainError",
     "Threads",
     "TransitionCounts",
+    "Verification",
     "bootstrap_elites",
     "build",
+    "curiosity",
     "diversity",
     "domains",
     "estimate",
     "experiments",
+    "from_ribs",
     "genotype_evolvability",
     "l_evolvability",
     "landscape",
@@ -85,6 +95,7 @@ __all__ = [
     "niche_evolvability",
     "prior_sensitivity",
     "variation",
+    "verify",
     "walk",
     "walks",
 ]

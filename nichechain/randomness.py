@@ -11,6 +11,8 @@ from enum import IntEnum
 
 import numpy as np
 
+from nichechain.arguments import check_seed
+
 
 class Purpose(IntEnum):
     """What a generator is for. The numbers are part of the archive format: never reuse one."""
@@ -72,5 +74,11 @@ def keyed(seed: int, purpose: Purpose, index: int = 0) -> np.random.Generator:
     -------
     numpy.random.Generator
         PCG64 seeded with ``SeedSequence(seed, spawn_key=(purpose, index))``.
+
+    Raises
+    ------
+    NichechainError
+        If the seed is negative or no whole number.
     """
+    check_seed(seed)
     return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(int(purpose), index)))

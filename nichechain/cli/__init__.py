@@ -17,7 +17,7 @@ COMMANDS = {
     "walks": "walks under pressure and with other metrics, tested and reported",
     "estimate": "the estimate of T, how well it foretells births, and whether they are enough",
     "compare": "l-evolvability, reach and coverage of one archive against another",
-    "verify": "whether an archive is what its seed and its domain make of it",
+    "verify": "whether an archive is what its configuration leads to, to the last bit",
     "merge": "archives of one domain, niches and mutation as one",
     "import": "births of another program's search, from CSV or Parquet",
     "plot": "heat maps of an archive and graphs of which niches lead to which",

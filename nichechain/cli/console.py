@@ -283,7 +283,7 @@ def _stage_lines() -> Callable[[str, int, int], None]:
         nonlocal last
         clock = clocks.setdefault(stage, _Clock())
         clock.begin(done)
-        if time.monotonic() - last < _LINE_EVERY:
+        if not done or time.monotonic() - last < _LINE_EVERY:
             return
         last = time.monotonic()
         left = clock.seconds_left(done, total)

@@ -24,7 +24,10 @@ from nichechain.experiments.studies import (
 )
 
 if TYPE_CHECKING:
+    from rich.table import Table
+
     from nichechain.domains import Domain
+    from nichechain.experiments.analysis import Analysis
 
 _HELP = """usage: nichechain walks STUDY ...
 
@@ -246,8 +249,7 @@ def _report(folder: Path, domain: Domain | None = None) -> int:
     for finding in find(analysis):
         found.add_row(finding.claim, finding.paper, finding.ours, finding.verdict)
     shown = console.console()
-    if found.row_count:
-        shown.print(found)
+    shown.print(found if found.row_count else _means(analysis, domain.unit))
     finished = [analysis.finished.get(condition.label, 0) for condition in study.conditions]
     least, most = min(finished), max(finished)
     runs = f"{least}" if least == most else f"{least} to {most}"
@@ -255,6 +257,22 @@ def _report(folder: Path, domain: Domain | None = None) -> int:
     for name in FILES:
         shown.print(f"  {folder / name}")
     return 0
+
+
+def _means(analysis: Analysis, unit: str) -> Table:
+    """What a study ends with on which the paper has no numbers."""
+    made = console.table("condition", "runs", f"mean η* at step {analysis.last} ({unit})", "95 % interval")
+    for summary in analysis.summaries:
+        if summary.measure == "expected_evolvability" and summary.step == analysis.last:
+            interval = f"{summary.low:.3g} to {summary.high:.3g}"
+            made.add_row(summary.condition, str(summary.n), f"{summary.mean:.3g}", interval)
+    for asked in analysis.asked:
+        if asked.test and asked.measure == "expected_evolvability" and asked.step == analysis.last:
+            test = asked.test
+            made.caption = (
+                f"{test.name}: {test.symbol} = {test.statistic:.3g}, p = {test.p:.2g}"
+            )
+    return made
 
 
 def command_of(study: Study, domain: Domain, folder: Path) -> str:
