@@ -111,7 +111,7 @@ class BuildConfig:
         object.__setattr__(self, "shape", tuple(int(cells) for cells in self.shape))
         object.__setattr__(self, "bounds", tuple((float(low), float(high)) for low, high in self.bounds))
         object.__setattr__(self, "scale", float(self.scale))
-        object.__setattr__(self, "domain_options", _plain_options(self.domain_options))
+        object.__setattr__(self, "domain_options", plain_options(self.domain_options))
         object.__setattr__(self, "layer_scales", tuple(float(scale) for scale in self.layer_scales))
         if self.df is not None:
             object.__setattr__(self, "df", float(self.df))
@@ -164,7 +164,7 @@ class BuildConfig:
         return cls(**values)
 
 
-def _plain_options(options: Mapping[str, DomainOption]) -> dict[str, DomainOption]:
+def plain_options(options: Mapping[str, DomainOption]) -> dict[str, DomainOption]:
     """Options in the order of their names, so that equal ones are written alike."""
     if not isinstance(options, Mapping):
         raise NichechainError(f"domain_options is {options!r}, but must map names to values")

@@ -105,7 +105,7 @@ class Build:
 
     def domain_options(self) -> dict[str, DomainOption]:
         """What the domain is told."""
-        given = dict(_option(text) for text in self.options)
+        given = dict(domain_option(text) for text in self.options)
         for name in ("descriptor", "controller", "steps", "noise", "repeats"):
             if getattr(self, name) is not None:
                 given[name] = getattr(self, name)
@@ -188,11 +188,13 @@ class Build:
             outside=config.outside,
             seed=config.seed,
             domain_seed=config.domain_seed,
-            options=tuple(f"{name}={_text(value)}" for name, value in config.domain_options.items()),
+            options=tuple(
+                f"{name}={domain_option_text(value)}" for name, value in config.domain_options.items()
+            ),
         )
 
 
-def _option(text: str) -> tuple[str, DomainOption]:
+def domain_option(text: str) -> tuple[str, DomainOption]:
     """``"joints=20"`` as ``("joints", 20)``."""
     name, equals, value = text.partition("=")
     if not name or not equals:
@@ -207,8 +209,8 @@ def _option(text: str) -> tuple[str, DomainOption]:
     return name, value
 
 
-def _text(value: DomainOption) -> str:
-    """What :func:`_option` reads as the value."""
+def domain_option_text(value: DomainOption) -> str:
+    """What :func:`domain_option` reads as the value."""
     return str(value).lower() if isinstance(value, bool) else str(value)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal, get_args
@@ -26,6 +26,7 @@ from nichechain.experiments.studies import (
 if TYPE_CHECKING:
     from rich.table import Table
 
+    from nichechain.config import DomainOption
     from nichechain.domains import Domain
     from nichechain.experiments.analysis import Analysis
 
@@ -64,6 +65,9 @@ class _Walks:
     """Mutation operator: cauchy, gaussian, student-t or uniform-ball."""
     scale: float = Condition.scale
     """Scale of the mutation."""
+    step_bound: Annotated[str | None, console.option("KIND:SIZE", "unbounded")] = None
+    """How far a child can be from its parent: per-coordinate:2 truncates the noise on every weight,
+    rescaled:50 shortens a step that is longer."""
     k: int = Condition.k
     """Neighbours of the kNN metrics."""
     bandwidth: float = Condition.bandwidth
@@ -90,6 +94,8 @@ class _Walks:
     """Seed of the study."""
     domain_seed: int = 0
     """Seed of what the domain holds fixed (fetch: where block and target begin)."""
+    options: Annotated[tuple[str, ...], console.option("NAME=VALUE ...", "none")] = ()
+    """Options of the domain, such as joints=20 of the arm, or descriptor=final-xy of a gym:ENV_ID."""
     workers: Annotated[str | None, console.option("WORKERS", "one thread per processor")] = None
     """Who evaluates: a number of threads, processes:N, ray or ray://HOST:PORT. The result is the same."""
 
@@ -195,20 +201,24 @@ def run(arguments: Sequence[str]) -> int:
 
 def _begin(command: Pressure | Metrics | Sensitivity, kind: Kind) -> int:
     from nichechain import domains
+    from nichechain.cli.build import domain_option
 
-    domain = domains.make(command.domain, seed=command.domain_seed)
-    return _walk(_study(command, kind, domain), domain, command.out, command.workers)
+    options = dict(domain_option(text) for text in command.options)
+    domain = domains.make(command.domain, seed=command.domain_seed, **options)
+    return _walk(_study(command, kind, domain, options), domain, command.out, command.workers)
 
 
 def _resume(command: Resume) -> int:
-    from nichechain import domains
+    from nichechain.config import BuildConfig
     from nichechain.experiments.running import read_study
+    from nichechain.trust import check_trusted
 
     study = read_study(command.path)
+    same = BuildConfig(study.domain, study.shape, study.bounds, domain_options=study.domain_options)
+    check_trusted(same, command.path)
     if command.runs is not None:
         study = replace(study, runs=command.runs)
-    domain = domains.make(study.domain, seed=study.domain_seed)
-    return _walk(study, domain, command.path, command.workers)
+    return _walk(study, study.make_domain(), command.path, command.workers)
 
 
 def _walk(study: Study, domain: Domain, folder: Path, workers: str | None) -> int:
@@ -226,30 +236,26 @@ def _walk(study: Study, domain: Domain, folder: Path, workers: str | None) -> in
                 f"Stopped; every finished step is kept. To go on:\n  nichechain walks resume {folder}"
             )
             return 130
-    return _report(folder, domain)
+    return _report(folder)
 
 
-def _report(folder: Path, domain: Domain | None = None) -> int:
+def _report(folder: Path) -> int:
     """Write the report of what is walked so far, and tell what it found."""
-    from nichechain import domains
     from nichechain.experiments.findings import find
     from nichechain.experiments.report import FILES, write_report
-    from nichechain.experiments.running import read_records, read_study
+    from nichechain.experiments.running import read_records, read_study, read_unit
 
-    study = read_study(folder)
+    study, unit = read_study(folder), read_unit(folder)
     records = read_records(folder, study)
-    domain = domain or domains.make(study.domain, seed=study.domain_seed)
     with console.spinner("testing and drawing"):
-        analysis = write_report(
-            folder, study, records, command=command_of(study, domain, folder), unit=domain.unit
-        )
+        analysis = write_report(folder, study, records, command=command_of(study, folder), unit=unit)
     found = console.table("claim", "paper", "here", "verdict")
     for column in found.columns[1:]:
         column.justify = "left"
     for finding in find(analysis):
         found.add_row(finding.claim, finding.paper, finding.ours, finding.verdict)
     shown = console.console()
-    shown.print(found if found.row_count else _means(analysis, domain.unit))
+    shown.print(found if found.row_count else _means(analysis, unit))
     finished = [analysis.finished.get(condition.label, 0) for condition in study.conditions]
     least, most = min(finished), max(finished)
     runs = f"{least}" if least == most else f"{least} to {most}"
@@ -269,14 +275,13 @@ def _means(analysis: Analysis, unit: str) -> Table:
     for asked in analysis.asked:
         if asked.test and asked.measure == "expected_evolvability" and asked.step == analysis.last:
             test = asked.test
-            made.caption = (
-                f"{test.name}: {test.symbol} = {test.statistic:.3g}, p = {test.p:.2g}"
-            )
+            made.caption = f"{test.name}: {test.symbol} = {test.statistic:.3g}, p = {test.p:.2g}"
     return made
 
 
-def command_of(study: Study, domain: Domain, folder: Path) -> str:
+def command_of(study: Study, folder: Path) -> str:
     """The command line that asks for a study."""
+    from nichechain.cli.build import domain_option_text
     from nichechain.experiments.studies import LEVELS, METRICS, VARIATIONS
 
     base = study.conditions[0]
@@ -300,13 +305,15 @@ def command_of(study: Study, domain: Domain, folder: Path) -> str:
                 options[field.name] = str(value)
     if study.shape != (20,) * len(study.shape):
         options["grid"] = "x".join(map(str, study.shape))
-    if study.bounds != domain.bounds:
-        options["bounds"] = ",".join(repr(bound) for pair in study.bounds for bound in pair)
+    options["bounds"] = ",".join(repr(bound) for pair in study.bounds for bound in pair)
     for name in ("seed", "domain_seed"):
         if getattr(study, name):
             options[name] = str(getattr(study, name))
     words = [f"--{name.replace('_', '-')} {shlex.quote(value)}" for name, value in options.items()]
     words += [f"--{name.replace('_', '-')}" for name in flags]
+    if study.domain_options:
+        given = (f"{name}={domain_option_text(value)}" for name, value in study.domain_options.items())
+        words += ["--options", *map(shlex.quote, given)]
     return " ".join(["nichechain walks", study.kind, study.domain, *words, "--out", shlex.quote(str(folder))])
 
 
@@ -314,7 +321,9 @@ def _words(text: str) -> list[str]:
     return [word.strip() for word in text.split(",") if word.strip()]
 
 
-def _study(command: Pressure | Metrics | Sensitivity, kind: Kind, domain: Domain) -> Study:
+def _study(
+    command: Pressure | Metrics | Sensitivity, kind: Kind, domain: Domain, options: Mapping[str, DomainOption]
+) -> Study:
     """What is asked for, checked."""
     from nichechain.niches import parse_bounds, parse_shape
 
@@ -333,4 +342,5 @@ def _study(command: Pressure | Metrics | Sensitivity, kind: Kind, domain: Domain
         domain_seed=command.domain_seed,
         seed=command.seed,
         paired=command.paired,
+        domain_options=options,
     )

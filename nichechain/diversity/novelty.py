@@ -27,6 +27,10 @@ class ArchiveRule:
         What may enter: every evaluated offspring, or the selected ones only.
     probability : float, optional
         With which each of those enters; by default 0.1 for offspring and 1 for the selected.
+    count : int, optional
+        Instead of a probability: so many of those enter in each step of a walk, drawn uniformly
+        without replacement, or all if there are fewer. Doncieux et al. (2020) let 6 of 40
+        offspring in.
     scope : {"walk", "configuration"}
         ``walk``: each walk has an archive of its own, empty at the start. ``configuration``: all
         walks of a configuration share one, in the order of their numbers, so that a walk depends
@@ -47,6 +51,7 @@ class ArchiveRule:
     limit: int = 1200
     entry: Entry = "offspring"
     probability: float | None = None
+    count: int | None = None
     scope: Scope = "walk"
 
     def __post_init__(self) -> None:
@@ -55,6 +60,13 @@ class ArchiveRule:
         if self.probability is not None and not 0 < self.probability <= 1:
             raise NichechainError(
                 f"archive probability is {self.probability}, but must be above 0 and at most 1"
+            )
+        if self.count is not None and self.count < 1:
+            raise NichechainError(f"archive count is {self.count}, but must be at least 1")
+        if self.count is not None and self.probability is not None:
+            raise NichechainError(
+                f"archive count {self.count} and probability {self.probability} exclude each other: "
+                "either so many enter, or each by chance"
             )
         for name, value, allowed in (
             ("entry", self.entry, get_args(Entry)),
@@ -69,6 +81,26 @@ class ArchiveRule:
         if self.probability is not None:
             return self.probability
         return 0.1 if self.entry == "offspring" else 1.0
+
+    def enters(self, lots: Floats, may: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Who enters in a step.
+
+        Parameters
+        ----------
+        lots : (R, N) array
+            A uniform number in [0, 1) for each of the N of each walk.
+        may : (R, N) bool array
+            Who may enter.
+
+        Returns
+        -------
+        (R, N) bool array
+        """
+        if self.count is None:
+            return (lots < self.chance) & may
+        # The smallest lots of those that may; a lot is below 1, so the others come after them.
+        rank = np.argsort(np.argsort(np.where(may, lots, 1.0), axis=1, kind="stable"), axis=1, kind="stable")
+        return (rank < self.count) & may
 
 
 @dataclass(frozen=True)

@@ -2,29 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 from nichechain.domains.arm import PlanarArm
 from nichechain.domains.base import Domain, Evaluation
-from nichechain.domains.fetch import FetchPickAndPlace
-from nichechain.errors import NichechainError
+from nichechain.domains.descriptors import Episode
+from nichechain.domains.fetch import FetchPickAndPlace, FetchPush, FetchReach, FetchSlide
+from nichechain.domains.gym import GymDomain
+from nichechain.domains.noise import Noise, Noisy, Perturbable, WithSensitivity, noise_sensitivity
+from nichechain.domains.registry import make, names, of
+from nichechain.domains.toy import CosinusMap, LinearMap
 
-__all__ = ["Domain", "Evaluation", "FetchPickAndPlace", "PlanarArm", "make"]
-
-_DOMAINS: dict[str, Callable[..., Domain]] = {
-    FetchPickAndPlace.name: FetchPickAndPlace,
-    PlanarArm.name: PlanarArm,
-}
-
-
-def make(name: str, *, seed: int = 0) -> Domain:
-    """The domain of that name, as the command line knows it.
-
-    Raises
-    ------
-    NichechainError
-        If there is none.
-    """
-    if name not in _DOMAINS:
-        raise NichechainError(f"domain is {name!r}, but must be one of {', '.join(sorted(_DOMAINS))}")
-    return _DOMAINS[name](seed=seed)
+__all__ = [
+    "CosinusMap",
+    "Domain",
+    "Episode",
+    "Evaluation",
+    "FetchPickAndPlace",
+    "FetchPush",
+    "FetchReach",
+    "FetchSlide",
+    "GymDomain",
+    "LinearMap",
+    "Noise",
+    "Noisy",
+    "Perturbable",
+    "PlanarArm",
+    "WithSensitivity",
+    "make",
+    "names",
+    "noise_sensitivity",
+    "of",
+]

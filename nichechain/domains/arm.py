@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from nichechain.domains.base import Evaluation, check_genotypes
+from nichechain.domains.noise import Noise, check_seeds
+from nichechain.errors import NichechainError
 
 if TYPE_CHECKING:
     from torch import nn
@@ -19,9 +21,14 @@ class PlanarArm:
     Parameters
     ----------
     joints : int
-        Number of joints.
+        Number of joints, at least 1.
     seed : int
-        Unused by the arm, which has nothing random; part of every domain.
+        Of noise, where there is some; the arm itself has nothing random.
+
+    Raises
+    ------
+    NichechainError
+        If there is no joint.
 
     Notes
     -----
@@ -38,6 +45,8 @@ class PlanarArm:
     chunk = 4096
 
     def __init__(self, joints: int = 10, *, seed: int = 0) -> None:
+        if joints < 1:
+            raise NichechainError(f"joints is {joints}, but an arm has at least 1")
         self.genotype_length = int(joints)
         self.seed = int(seed)
 
@@ -56,7 +65,23 @@ class PlanarArm:
 
     def evaluate(self, genotypes: ArrayLike) -> Evaluation:
         """Position of the hand for each genotype (N, joints)."""
-        angles = check_genotypes(genotypes, self.genotype_length).astype(np.float64)
+        return self._evaluate(check_genotypes(genotypes, self.genotype_length).astype(np.float64))
+
+    def evaluate_noisy(self, genotypes: ArrayLike, noise: Noise, seeds: ArrayLike) -> Evaluation:
+        """Position of the hand, the angle of every joint disturbed by ``noise.action`` (rad).
+
+        Raises
+        ------
+        NichechainError
+            If a shape does not fit, or there is noise of another kind.
+        """
+        noise.only("action", domain=self.name)
+        rows = check_genotypes(genotypes, self.genotype_length)
+        size = self.genotype_length
+        drawn = [np.random.default_rng(int(s)).standard_normal(size) for s in check_seeds(seeds, rows)]
+        return self._evaluate(rows + noise.action * np.reshape(drawn, (-1, size)))
+
+    def _evaluate(self, angles: NDArray[np.float64]) -> Evaluation:
         failed: NDArray[np.bool_] = np.logical_not(np.isfinite(angles).all(axis=1))
         directions = np.cumsum(np.where(failed[:, None], 0.0, angles), axis=1)
         hand = np.stack([np.cos(directions).mean(axis=1), np.sin(directions).mean(axis=1)], axis=1)

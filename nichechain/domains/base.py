@@ -31,12 +31,16 @@ class Evaluation:
     failed : (N,) bool array
     reasons : tuple of str
         Why each row failed; empty where it did not.
+    spread : (N, B) float64 array, optional
+        Standard deviation of behavior over the repeats of an evaluation, where a domain repeats
+        them; NaN in the rows that failed.
     """
 
     behavior: Floats
     objective: Floats
     failed: NDArray[np.bool_]
     reasons: tuple[str, ...]
+    spread: Floats | None = None
 
     def __len__(self) -> int:
         return len(self.objective)
@@ -44,11 +48,18 @@ class Evaluation:
     @staticmethod
     def concatenate(parts: Sequence[Evaluation]) -> Evaluation:
         """The rows of several evaluations, in order."""
+        spread = None
+        if any(part.spread is not None for part in parts):
+            # A row that was given up without an evaluation has none.
+            spread = np.concatenate(
+                [np.full_like(p.behavior, np.nan) if p.spread is None else p.spread for p in parts]
+            )
         return Evaluation(
             np.concatenate([part.behavior for part in parts]),
             np.concatenate([part.objective for part in parts]),
             np.concatenate([part.failed for part in parts]),
             tuple(reason for part in parts for reason in part.reasons),
+            spread,
         )
 
 

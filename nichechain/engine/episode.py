@@ -110,17 +110,27 @@ def _observe(
 
 
 @numba.njit(nogil=True, cache=True)
+def _clip(value: Any) -> Any:
+    """``np.clip`` to [-1, 1], as the environment's step does with an action; NaN stays."""
+    if value > np.float32(1.0):
+        return np.float32(1.0)
+    if value < np.float32(-1.0):
+        return np.float32(-1.0)
+    return value
+
+
+@numba.njit(nogil=True, cache=True)
 def _act(state: Any, action: Any, actuator_qpos: Any, ids: Any, blocked: Any) -> None:
     """``_set_action``: a displacement of the mocap body, and targets for the fingers."""
     qpos, _, ctrl, mocap_pos, mocap_quat, xpos, xquat, _, _ = state
     welded = ids[6]
     for k in range(3):
         # float32 times a Python float stays float32 in NumPy.
-        step = np.float32(action[k]) * np.float32(0.05)
+        step = _clip(action[k]) * np.float32(0.05)
         mocap_pos[0, k] = xpos[welded, k] + np.float64(step)
     for k in range(4):
         mocap_quat[0, k] = xquat[welded, k] + (1.0 if k % 2 == 0 else 0.0)
-    grip = 0.0 if blocked else np.float64(action[3])
+    grip = 0.0 if blocked else np.float64(_clip(action[3]))
     for i in range(actuator_qpos.size):
         ctrl[i] = grip if actuator_qpos[i] < 0 else qpos[actuator_qpos[i]] + grip
 
@@ -140,6 +150,8 @@ def run(
     parameters: Any,
     sizes: Any,
     activations: Any,
+    observation_noise: Any,
+    action_noise: Any,
     observations: Any,
     actions: Any,
 ) -> None:
@@ -167,6 +179,10 @@ def run(
         Seconds per action.
     parameters, sizes, activations
         The policy, see :func:`nichechain.engine.policy.forward`.
+    observation_noise : (steps, inputs) float64
+        Added to what the policy sees; (0, inputs) for none.
+    action_noise : (steps, outputs) float32
+        Added to what the policy does; (0, outputs) for none.
     observations : (steps + 1, inputs) float64
         Written; the last row is what the environment returns after the last step.
     actions : (steps, outputs) float32
@@ -176,9 +192,18 @@ def run(
     jac = np.empty((3, state[1].size))
     work = np.empty(16, np.int64)
     hidden = np.empty((2, sizes.max()), np.float32)
+    seen = np.empty(observations.shape[1])
     _observe(c, model, data, state, ids, dt, jac, work, observations[0])
     for t in range(actions.shape[0]):
-        forward(parameters, sizes, activations, hidden, observations[t], actions[t])
+        if observation_noise.shape[0]:
+            for j in range(seen.size):
+                seen[j] = observations[t, j] + observation_noise[t, j]
+            forward(parameters, sizes, activations, hidden, seen, actions[t])
+        else:
+            forward(parameters, sizes, activations, hidden, observations[t], actions[t])
+        if action_noise.shape[0]:
+            for j in range(actions.shape[1]):
+                actions[t, j] += action_noise[t, j]
         _act(state, actions[t], actuator_qpos, ids, blocked)
         for _ in range(substeps):
             call(c[_STEP], (model, data))

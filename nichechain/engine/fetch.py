@@ -44,13 +44,41 @@ class Episode:
     failure: str
 
 
+@dataclass(frozen=True)
+class Disturbance:
+    """What noise does to one episode; nothing, where it is left out.
+
+    Parameters
+    ----------
+    observation : (steps, inputs) float64 array, optional
+        Added to what the policy sees.
+    action : (steps, 4) float32 array, optional
+        Added to what the policy does.
+    shift : (2,) float64 array, optional
+        Moves the block before the episode, metres.
+    """
+
+    observation: NDArray[np.float64] | None = None
+    action: NDArray[np.float32] | None = None
+    shift: NDArray[np.float64] | None = None
+
+
+UNDISTURBED = Disturbance()
+
+
 class FetchEpisodes(Protocol):
     """Runs episodes from one reset state."""
 
     inputs: int
     goal: NDArray[np.float64]
 
-    def run(self, controller: Controller, genotype: NDArray[np.float32], steps: int) -> Episode:
+    def run(
+        self,
+        controller: Controller,
+        genotype: NDArray[np.float32],
+        steps: int,
+        disturbance: Disturbance = UNDISTURBED,
+    ) -> Episode:
         """One episode; safe to call from several threads."""
         ...
 
@@ -96,19 +124,32 @@ class SteppedFetch:
         self.inputs = int(first["observation"].size)
         self.goal = np.array(first["desired_goal"])
 
-    def run(self, controller: Controller, genotype: NDArray[np.float32], steps: int) -> Episode:
+    def run(
+        self,
+        controller: Controller,
+        genotype: NDArray[np.float32],
+        steps: int,
+        disturbance: Disturbance = UNDISTURBED,
+    ) -> Episode:
         """One episode; every thread has an environment of its own."""
         policy = controller.policy(genotype)
         # list.pop and list.append are atomic, so the list is a pool without a lock.
         env = self._idle.pop() if self._idle else _make(self._env_id)
         observation, _ = env.reset(seed=self._seed)
+        if disturbance.shift is not None:
+            observation = _shifted(env.unwrapped, disturbance.shift)
         observations = [observation["observation"]]
         actions = np.empty((steps, controller.outputs), np.float32)
         for t in range(steps):
-            actions[t] = policy(observations[-1][None])[0]
+            seen = observations[-1]
+            if disturbance.observation is not None:
+                seen = seen + disturbance.observation[t]
+            actions[t] = policy(seen[None])[0]
+            if disturbance.action is not None:
+                actions[t] += disturbance.action[t]
             observation, *_ = env.step(actions[t])
             observations.append(observation["observation"])
-        failure = _failure(env.unwrapped.data)
+        failure = physics_failure(env.unwrapped.data)
         self._idle.append(env)
         return Episode(np.array(observations), actions, failure)
 
@@ -148,10 +189,18 @@ class NativeFetch:
         self._ids, self._actuator_qpos = _addresses(self._model, unwrapped._model_names.joint_names)
         self._idle: list[mujoco.MjData] = []
 
-    def run(self, controller: Controller, genotype: NDArray[np.float32], steps: int) -> Episode:
+    def run(
+        self,
+        controller: Controller,
+        genotype: NDArray[np.float32],
+        steps: int,
+        disturbance: Disturbance = UNDISTURBED,
+    ) -> Episode:
         """One episode; every thread has an mjData of its own."""
         assert isinstance(controller, MLP)
         import mujoco
+
+        start = self._start if disturbance.shift is None else self._displaced(disturbance.shift)
 
         # list.pop and list.append are atomic, so the list is a pool without a lock.
         data = self._idle.pop() if self._idle else mujoco.MjData(self._model)
@@ -161,7 +210,7 @@ class NativeFetch:
             self._functions,
             self._model._address,
             data._address,
-            self._start._address,
+            start._address,
             (
                 data.qpos,
                 data.qvel,
@@ -181,12 +230,26 @@ class NativeFetch:
             controller.parameters(genotype),
             np.array(controller.sizes),
             controller.activations,
+            np.empty((0, self.inputs)) if disturbance.observation is None else disturbance.observation,
+            np.empty((0, controller.outputs), np.float32)
+            if disturbance.action is None
+            else disturbance.action,
             observations,
             actions,
         )
-        failure = _failure(data)
+        failure = physics_failure(data)
         self._idle.append(data)
         return Episode(observations, actions, failure)
+
+    def _displaced(self, shift: NDArray[np.float64]) -> mujoco.MjData:
+        """The reset state with the block moved, as the environment's reset would place it."""
+        import mujoco
+
+        start = copy.copy(self._start)
+        address = int(self._model.joint("object0:joint").qposadr[0])
+        start.qpos[address : address + 2] += shift
+        mujoco.mj_forward(self._model, start)
+        return start
 
 
 def _is_compiled(episode: ModuleType) -> bool:
@@ -206,6 +269,15 @@ def _make(env_id: str) -> Any:
 
     gymnasium.register_envs(gymnasium_robotics)
     return gymnasium.make(env_id, disable_env_checker=True)
+
+
+def _shifted(env: Any, shift: NDArray[np.float64]) -> Any:
+    """Move the block of an environment that was just reset; what is observed then."""
+    place = env._utils.get_joint_qpos(env.model, env.data, "object0:joint")
+    place[:2] += shift
+    env._utils.set_joint_qpos(env.model, env.data, "object0:joint", place)
+    env._mujoco.mj_forward(env.model, env.data)
+    return env._get_obs()
 
 
 def _addresses(
@@ -237,7 +309,7 @@ def _addresses(
     return np.array(ids, np.int64), np.array(targets, np.int64)
 
 
-def _failure(data: mujoco.MjData) -> str:
+def physics_failure(data: mujoco.MjData) -> str:
     """Names of MuJoCo's warnings in this episode that make its result meaningless."""
     counts = data.warning.number
     if not counts.any():

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from nichechain.experiments.conditions import Condition, condition_seed, pressure_of, selection_of
 from nichechain.experiments.initialisation import initialise
-from nichechain.experiments.running import read_births, read_records, read_study, run
+from nichechain.experiments.running import is_study, read_births, read_records, read_study, run
 from nichechain.experiments.studies import (
     LEVELS,
     METRICS,
@@ -23,6 +23,7 @@ __all__ = [
     "Study",
     "condition_seed",
     "initialise",
+    "is_study",
     "metric_conditions",
     "pressure_conditions",
     "pressure_of",

@@ -13,6 +13,7 @@ from nichechain.errors import NichechainError
 from nichechain.experiments.initialisation import check_scheme
 from nichechain.randomness import Purpose, keyed
 from nichechain.variation import Mutation
+from nichechain.variation.configured import parse_step_bound
 from nichechain.walks import (
     BetterThanParent,
     Selection,
@@ -45,6 +46,9 @@ class Condition:
         Mutation operator.
     scale : float
         Its scale.
+    step_bound : str, optional
+        Bound of a mutation's step, such as ``per-coordinate:2`` or ``rescaled:50``, that makes N(θ)
+        a bounded set, see :class:`nichechain.variation.Bound`.
     k : int
         Neighbours of the kNN metrics.
     bandwidth : float
@@ -80,6 +84,7 @@ class Condition:
     decay: float = 1.0
     archive_limit: int = 1200
     archive_scope: Literal["walk", "configuration"] = "walk"
+    step_bound: str | None = None
     other_niche: bool = False
     initialisation: str = "domain"
 
@@ -114,7 +119,10 @@ class Condition:
 
     def mutate(self) -> Mutation:
         """The mutation operator."""
-        return variation.make(self.mutation, self.scale)
+        bound = None
+        if self.step_bound is not None:
+            bound = variation.Bound(*parse_step_bound(self.step_bound))
+        return variation.make(self.mutation, self.scale, bound=bound)
 
     def _metric(self) -> Metric:
         if self.metric in ("knn", "knn-no-archive"):

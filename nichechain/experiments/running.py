@@ -23,7 +23,7 @@ import pyarrow.compute as pc
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
-from nichechain import domains, store
+from nichechain import store
 from nichechain.domains.base import Domain
 from nichechain.errors import ArchiveError, NichechainError
 from nichechain.execution import Executor
@@ -117,13 +117,13 @@ def run(
         If the domain is unknown or a start fails to evaluate.
     """
     folder = Path(folder)
-    domain = domain or domains.make(study.domain, seed=study.domain_seed)
+    domain = domain or study.make_domain()
     with store.writing(folder):
         if (folder / _STUDY).exists():
             _check_continues(read_study(folder), study, folder)
         for name in ("records", "births"):
             (folder / name).mkdir(exist_ok=True)
-        _write_study(folder, study)
+        _write_study(folder, study, domain.unit)
         finished = finished_blocks(folder, study)
         done = sum(block.evaluations(study.steps) for block in finished)
         _tell(on_progress, done)
@@ -135,6 +135,11 @@ def run(
             path.unlink(missing_ok=True)
 
 
+def is_study(folder: str | Path) -> bool:
+    """Whether a folder holds a study."""
+    return (Path(folder) / _STUDY).is_file()
+
+
 def read_study(folder: str | Path) -> Study:
     """The study that a folder holds.
 
@@ -143,17 +148,32 @@ def read_study(folder: str | Path) -> Study:
     ArchiveError
         If there is none, it is damaged, or a newer version wrote it.
     """
-    path = Path(folder) / _STUDY
+    return _read_study(Path(folder))[0]
+
+
+def read_unit(folder: str | Path) -> str:
+    """Unit of behavior of the study that a folder holds, without making its domain.
+
+    Raises
+    ------
+    ArchiveError
+        As :func:`read_study`.
+    """
+    return _read_study(Path(folder))[1]
+
+
+def _read_study(folder: Path) -> tuple[Study, str]:
+    path = folder / _STUDY
     try:
         values = json.loads(path.read_text("utf-8"))
         if values["format"] != _FORMAT:
             raise ArchiveError(f"{path} has format {values['format']}, but this version reads {_FORMAT}")
-        return Study.from_json(values["study"])
+        return Study.from_json(values["study"]), str(values["unit"])
     except FileNotFoundError:
         raise ArchiveError(f"{folder} holds no study: it has no {_STUDY}") from None
+    except ArchiveError:
+        raise
     except (ValueError, KeyError, TypeError, AttributeError, NichechainError) as error:
-        if isinstance(error, ArchiveError):
-            raise
         raise ArchiveError(f"{path} is damaged: {error}") from error
 
 
@@ -304,8 +324,13 @@ def _check_continues(old: Study, new: Study, folder: Path) -> None:
         )
 
 
-def _write_study(folder: Path, study: Study) -> None:
-    values = {"format": _FORMAT, "study": study.to_json(), "versions": store.library_versions()}
+def _write_study(folder: Path, study: Study, unit: str) -> None:
+    values = {
+        "format": _FORMAT,
+        "study": study.to_json(),
+        "unit": unit,
+        "versions": store.library_versions(),
+    }
     write_atomically(folder / _STUDY, json.dumps(values, indent=1).encode())
 
 

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import MISSING, asdict, dataclass, fields, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import MISSING, asdict, dataclass, field, fields, replace
 from typing import Any, Literal, get_args
 
+from nichechain import domains
+from nichechain.config import DomainOption, plain_options
+from nichechain.domains.base import Domain
 from nichechain.errors import NichechainError
 from nichechain.experiments.conditions import Condition, pressure_of
 from nichechain.niches import GridNiches
@@ -58,6 +61,8 @@ class Study:
         Its bounds, in units of behavior.
     domain_seed : int
         Seed of what the domain holds fixed.
+    domain_options : mapping of str to str, int, float or bool
+        What the domain is told besides, see :func:`nichechain.domains.make`.
     seed : int
         Seed of the study.
     paired : bool
@@ -80,6 +85,7 @@ class Study:
     domain_seed: int = 0
     seed: int = 0
     paired: bool = False
+    domain_options: Mapping[str, DomainOption] = field(default_factory=dict, hash=False)
 
     def __post_init__(self) -> None:
         if self.kind not in get_args(Kind):
@@ -99,11 +105,22 @@ class Study:
             for condition in self.conditions:
                 pressure_of(condition.level)
         GridNiches(self.shape, self.bounds)
+        object.__setattr__(self, "domain_options", plain_options(self.domain_options))
 
     @property
     def evaluations(self) -> int:
         """Rollouts in all, the starts among them."""
         return sum(self.runs * (1 + (self.steps + 1) * c.offspring) for c in self.conditions)
+
+    def make_domain(self) -> Domain:
+        """The domain that is walked on.
+
+        Raises
+        ------
+        NichechainError
+            If it is unknown or does not know an option.
+        """
+        return domains.make(self.domain, seed=self.domain_seed, **self.domain_options)
 
     def condition(self, label: str) -> Condition:
         """The condition of that label."""
@@ -158,13 +175,13 @@ def variations(name: str, base: Condition) -> tuple[Condition, ...]:
         raise NichechainError(f"study is {name!r}, but must be one of {', '.join(VARIATIONS)}")
     if name in _KDE:
         base = replace(base, metric="kde")
-    ((field, values),) = VARIATIONS[name].items()
-    return tuple(replace(base, label=f"{field} {value}", **{field: value}) for value in values)
+    ((varied, values),) = VARIATIONS[name].items()
+    return tuple(replace(base, label=f"{varied} {value}", **{varied: value}) for value in values)
 
 
 def _read(kind: Any, values: dict[str, Any]) -> Any:
     names = {field.name for field in fields(kind)}
-    needed = {field.name for field in fields(kind) if field.default is MISSING}
+    needed = {f.name for f in fields(kind) if f.default is MISSING and f.default_factory is MISSING}
     odd = (set(values) - names) | (needed - set(values))
     if odd:
         raise NichechainError(f"the study has missing or unknown values: {', '.join(sorted(odd))}")

@@ -18,9 +18,9 @@ from nichechain.births import NONE, Offspring
 from nichechain.diversity import NoveltyArchive, Surroundings
 from nichechain.domains.base import Domain, Evaluation
 from nichechain.errors import NichechainError
-from nichechain.execution import Executor
+from nichechain.execution import Executor, evaluate_rows
 from nichechain.landscape import niches_of, population_evolvability
-from nichechain.niches import GridNiches
+from nichechain.niches import Niches
 from nichechain.randomness import Purpose, keyed
 from nichechain.variation import Mutation
 from nichechain.walks.config import WalkConfig, run_seed
@@ -59,7 +59,7 @@ class Walks:
     domain : Domain
     mutate : Mutation
     config : WalkConfig
-    niches : GridNiches, optional
+    niches : Niches, optional
         For the niche variant, coverage and the niches of births.
 
     Raises
@@ -69,7 +69,7 @@ class Walks:
     """
 
     def __init__(
-        self, domain: Domain, mutate: Mutation, config: WalkConfig, niches: GridNiches | None = None
+        self, domain: Domain, mutate: Mutation, config: WalkConfig, niches: Niches | None = None
     ) -> None:
         if config.other_niche and niches is None:
             raise NichechainError("other_niche is asked for, but a niche walk needs niches: none are given")
@@ -238,7 +238,7 @@ class Walks:
         on_done: Callable[[int], None] | None = None,
     ) -> Evaluation:
         if executor is None:
-            return self._domain.evaluate(genotypes)
+            return evaluate_rows(self._domain, genotypes)
         return executor.evaluate(self._domain, genotypes, on_done)
 
     def _offspring(self, state: WalkState, seeds: Sequence[int]) -> Offspring:
@@ -305,9 +305,8 @@ class Walks:
         if not self._config.metric.remembers:
             return state.archive
         lots = [keyed(seed, Purpose.NOVELTY_ARCHIVE, state.step).random(children.shape[1]) for seed in seeds]
-        enters = (np.stack(lots) < rule.chance) & ~failed
-        if rule.entry == "selected":
-            enters &= follows
+        may = ~failed & follows if rule.entry == "selected" else ~failed
+        enters = rule.enters(np.stack(lots), may)
         archives = len(state.archive.entered)
         return state.archive.add(
             children.reshape(archives, -1, children.shape[2]),

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from nichechain.domains.base import Domain
 from nichechain.errors import NichechainError
 from nichechain.execution import Executor
-from nichechain.niches import GridNiches
+from nichechain.niches import Niches
 from nichechain.randomness import Purpose, keyed
 from nichechain.variation import Mutation
 from nichechain.walks.advancing import Walks, run_numbers
@@ -54,7 +54,7 @@ def walk(
     *,
     runs: int | Sequence[int] = 50,
     steps: int = 50,
-    niches: GridNiches | None = None,
+    niches: Niches | None = None,
     genotypes: ArrayLike | None = None,
     executor: Executor | None = None,
 ) -> WalkResult:

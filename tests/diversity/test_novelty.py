@@ -42,12 +42,38 @@ def test_probability_is_the_papers_for_offspring_and_certain_for_the_selected():
     assert ArchiveRule(entry="selected", probability=0.5).chance == 0.5
 
 
+@given(st.integers(0, 2**32), st.integers(1, 9), st.floats(0, 1))
+def test_so_many_enter_and_all_where_there_are_fewer(seed, count, share):
+    rng = np.random.default_rng(seed)
+    lots, may = rng.random((5, 8)), rng.random((5, 8)) < share
+    enters = ArchiveRule(count=count).enters(lots, may)
+    for row, allowed, entered in zip(lots, may, enters, strict=True):
+        drawn = sorted(np.flatnonzero(allowed), key=lambda i: row[i])[:count]
+        assert set(np.flatnonzero(entered)) == set(drawn)
+
+
+def test_each_is_as_likely_to_be_among_the_six():
+    enters = ArchiveRule(count=6).enters(
+        np.random.default_rng(0).random((4000, 40)), np.ones((4000, 40), bool)
+    )
+    assert (enters.sum(axis=1) == 6).all()
+    # A share of 0.15 with a standard error of 0.0056; forty of them stay within five.
+    np.testing.assert_allclose(enters.mean(axis=0), 0.15, atol=0.028)
+
+
+def test_by_chance_each_enters_on_its_own():
+    lots = np.array([[0.05, 0.2, 0.05]])
+    assert ArchiveRule().enters(lots, np.array([[True, True, False]])).tolist() == [[True, False, False]]
+
+
 @pytest.mark.parametrize(
     ("values", "message"),
     [
         ({"limit": 0}, "archive limit is 0"),
         ({"probability": 0.0}, "archive probability is 0.0"),
         ({"probability": 1.5}, "archive probability is 1.5"),
+        ({"count": 0}, "archive count is 0"),
+        ({"count": 6, "probability": 0.1}, "exclude each other"),
         ({"entry": "all"}, "archive entry is 'all', but must be offspring or selected"),
         ({"scope": "run"}, "archive scope is 'run', but must be walk or configuration"),
     ],
