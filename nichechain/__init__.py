@@ -27,7 +27,7 @@ if TYPE_CHECKING:
         prior_sensitivity,
     )
     from nichechain.execution import Threads
-    from nichechain.niches import GridNiches
+    from nichechain.niches import CVTNiches, GridNiches, Niches, one_hot
     from nichechain.pyribs import from_ribs
     from nichechain.selection import curiosity
     from nichechain.verification import Verification, verify
@@ -40,6 +40,7 @@ _HOMES = {
     "Archive": "archive",
     "ArchiveError": "errors",
     "BuildConfig": "config",
+    "CVTNiches": "niches",
     "Elite": "archive",
     "Evolvability": "evolvability",
     "GridNiches": "niches",
@@ -47,6 +48,7 @@ _HOMES = {
     "NicheChain": "chain",
     "NicheEvolvability": "evolvability",
     "NichechainError": "errors",
+    "Niches": "niches",
     "Threads": "execution",
     "TransitionCounts": "chain",
     "Verification": "verification",
@@ -59,6 +61,7 @@ _HOMES = {
     "l_evolvability": "evolvability",
     "load": "archive",
     "niche_evolvability": "evolvability",
+    "one_hot": "niches",
     "prior_sensitivity": "evolvability",
     "verify": "verification",
     "walk": "walks",
@@ -70,6 +73,7 @@ __all__ = [
     "Archive",
     "ArchiveError",
     "BuildConfig",
+    "CVTNiches",
     "Elite",
     "Evolvability",
     "GridNiches",
@@ -77,6 +81,7 @@ __all__ = [
     "NicheChain",
     "NicheEvolvability",
     "NichechainError",
+    "Niches",
     "Threads",
     "TransitionCounts",
     "Verification",
@@ -93,6 +98,7 @@ __all__ = [
     "landscape",
     "load",
     "niche_evolvability",
+    "one_hot",
     "prior_sensitivity",
     "variation",
     "verify",

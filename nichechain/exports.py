@@ -17,7 +17,7 @@ import numpy as np
 import pandas as pd
 
 from nichechain.errors import NichechainError
-from nichechain.niches import GridNiches
+from nichechain.niches import Niches
 
 if TYPE_CHECKING:
     import networkx as nx
@@ -95,14 +95,14 @@ def write_edges(graph: nx.DiGraph, path: str | Path) -> None:
     _replace(path, _csv(names, ([edge.get(name, "") for name in names] for edge in edges)))
 
 
-def write_stn(births: pd.DataFrame, niches: GridNiches, path: str | Path) -> None:
+def write_stn(births: pd.DataFrame, niches: Niches, path: str | Path) -> None:
     """Write births as the input of Search Trajectory Networks: one line per step of the search.
 
     Parameters
     ----------
     births : pandas.DataFrame
         The columns of :mod:`nichechain.births`, such as ``archive.births()``.
-    niches : GridNiches
+    niches : Niches
         What the locations of the network are; they are called by their grid index, as in
         ``7_11``.
     path : str or Path
@@ -144,14 +144,14 @@ def write_stn(births: pd.DataFrame, niches: GridNiches, path: str | Path) -> Non
     _replace(path, _csv(names, rows, separator))
 
 
-def write_phylogeny(births: pd.DataFrame, niches: GridNiches, path: str | Path) -> None:
+def write_phylogeny(births: pd.DataFrame, niches: Niches, path: str | Path) -> None:
     """Write who descends from whom in the ALife data standard, for phylotrackpy and its kin.
 
     Parameters
     ----------
     births : pandas.DataFrame
         The columns of :mod:`nichechain.births`, such as ``archive.births()``.
-    niches : GridNiches
+    niches : Niches
     path : str or Path
 
     Raises

@@ -13,11 +13,29 @@ import pyarrow.compute as pc
 
 from nichechain import store
 from nichechain.births import Offspring
+from nichechain.config import BuildConfig
 from nichechain.errors import ArchiveError, NichechainError
 from nichechain.illumination import Elites, SearchState
+from nichechain.niches import Niches
 
 # What archives must have in common: what T is about, and what makes a birth an elite.
-_SHARED = ("domain", "domain_seed", "shape", "bounds", "outside", "mutation", "scale", "replacement")
+_SHARED = (
+    "domain",
+    "domain_seed",
+    "domain_options",
+    "niches",
+    "niches_seed",
+    "shape",
+    "bounds",
+    "outside",
+    "mutation",
+    "scale",
+    "df",
+    "step_bound",
+    "layer_scales",
+    "self_adaptive",
+    "replacement",
+)
 
 
 def merge(folders: Sequence[str | Path], out: str | Path) -> None:
@@ -53,6 +71,7 @@ def merge(folders: Sequence[str | Path], out: str | Path) -> None:
         raise NichechainError(f"{len(paths)} archive cannot be merged: give at least two")
     metas = [store.read_meta(path) for path in paths]
     runs = _runs(paths, metas)
+    niches = _niches(paths, metas)
     # Checked before anything is read at length.
     if store.is_archive(out):
         raise ArchiveError(f"{out} already holds an archive: merge into another folder")
@@ -73,7 +92,8 @@ def merge(folders: Sequence[str | Path], out: str | Path) -> None:
     with store.writing(out):
         if store.is_archive(out):
             raise ArchiveError(f"{out} already holds an archive: merge into another folder")
-        writer = store.Writer(out, config, metas[0].facts, {"kind": "merged", "runs": runs})
+        origin = {"kind": "merged", "runs": runs}
+        writer = store.Writer(out, config, metas[0].facts, origin, niches=niches)
         writer.append(births)
         writer.commit(state)
 
@@ -113,14 +133,20 @@ def _runs(paths: list[Path], metas: list[store.Meta]) -> list[dict[str, Any]]:
     return runs
 
 
+def _niches(paths: list[Path], metas: list[store.Meta]) -> Niches:
+    """The niches of all archives: those of one seed can still differ, as libraries do."""
+    first, *others = (store.read_niches(path, meta) for path, meta in zip(paths, metas, strict=True))
+    for path, niches in zip(paths[1:], others, strict=True):
+        if niches != first:
+            raise NichechainError(f"{paths[0]} and {path} have different centroids, but must have the same")
+    return first
+
+
 def _same_search(first: dict[str, Any], second: dict[str, Any]) -> bool:
     """Whether two configurations differ in nothing but how far they go."""
-    # A configuration that was stored has lists where a new one has tuples.
-    return all(_listed(first[name]) == _listed(second[name]) for name in first if name != "evaluations")
-
-
-def _listed(value: Any) -> Any:
-    return [_listed(part) for part in value] if isinstance(value, (list, tuple)) else value
+    # What an earlier version stored lacks the values that came later, and has lists for tuples.
+    ours, theirs = BuildConfig.from_json(first), BuildConfig.from_json(second)
+    return replace(ours, evaluations=theirs.evaluations) == theirs
 
 
 def _renumbered(births: pa.Table, first_run: int, first_uid: int) -> pa.Table:

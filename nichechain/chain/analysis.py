@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
+from nichechain.arguments import check_numbers
 from nichechain.chain.linear import solve_substochastic
 from nichechain.chain.model import NicheChain
 from nichechain.errors import NichechainError
@@ -202,6 +203,7 @@ def to_deeptime(chain: NicheChain) -> Any:
 
 
 def _above(chain: NicheChain, threshold: float) -> sparse.csr_array:
+    check_numbers(threshold=threshold)
     if not 0.0 <= threshold < 1.0:
         raise NichechainError(f"threshold is {threshold}, but must be at least 0 and below 1")
     entries = transition_entries(chain)

@@ -12,11 +12,12 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
-from scipy.signal import fftconvolve
 
 from nichechain.alias import RowSampler
 from nichechain.chain.counts import TransitionCounts
-from nichechain.niches import GridNiches
+from nichechain.chain.displacement import Displacement, GridDisplacement
+from nichechain.chain.distance import DistanceDisplacement
+from nichechain.niches import GridNiches, Niches
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -28,20 +29,21 @@ class BaseMeasure:
 
     Parameters
     ----------
-    niches : GridNiches
+    niches : Niches
     destination : (S,) float64 array
         Share of births in each state.
-    displacement : float64 array of shape (2 k - 1, ...) for k cells along an axis
-        Share of each displacement, in cells, among births inside of parents inside.
+    displacement : Displacement
+        How far children land, among births inside of parents inside: on a grid in cells along each
+        axis, elsewhere by distance.
     leaving : float
         Share of births outside, among births of parents inside.
     weights : (3,) float64 array
         Of destination, displacement and uniform.
     """
 
-    niches: GridNiches
+    niches: Niches
     destination: Floats
-    displacement: Floats
+    displacement: Displacement
     leaving: float
     weights: Floats
 
@@ -55,13 +57,15 @@ class BaseMeasure:
         # One imaginary birth, spread over all states, keeps every share positive.
         destination = np.bincount(child, count, niches.states) + 1.0 / niches.states
         inside = (parent < n) & (child < n)
-        kernel = np.zeros(tuple(2 * k - 1 for k in niches.shape))
-        np.add.at(kernel, _cells_apart(niches, parent[inside], child[inside]), count[inside])
-        # Half a birth at no distance keeps the kernel usable from every niche.
-        kernel[tuple(k - 1 for k in niches.shape)] += 0.5
+        apart = parent[inside].astype(np.int64), child[inside].astype(np.int64), count[inside]
+        displacement: Displacement
+        if isinstance(niches, GridNiches):
+            displacement = GridDisplacement.pooled(niches, *apart)
+        else:
+            displacement = DistanceDisplacement.pooled(niches, *apart)
         left = count[(parent < n) & (child >= n)].sum() if niches.states > n else 0
         leaving = left / max(1, left + count[inside].sum())
-        return cls(niches, destination / destination.sum(), kernel / kernel.sum(), float(leaving), weights)
+        return cls(niches, destination / destination.sum(), displacement, float(leaving), weights)
 
     def components(self, parent: Ints, child: Ints) -> Floats:
         """Probability of each pair under each component, (3, N).
@@ -106,8 +110,7 @@ class BaseMeasure:
         # A parent outside has no cell to be displaced from; neither has a child outside.
         result = np.where(parent < n, np.where(child < n, 0.0, self.leaving), self.destination[child])
         inside = (parent < n) & (child < n)
-        where = _cells_apart(self.niches, parent[inside], child[inside])
-        share = self.displacement[where] / self.within[parent[inside]]
+        share = self.displacement.at(parent[inside], child[inside]) / self.within[parent[inside]]
         result[inside] = (1.0 - self.leaving) * share
         return result
 
@@ -115,43 +118,19 @@ class BaseMeasure:
     def _destinations(self) -> RowSampler:
         return RowSampler(sparse.csr_array(self.destination[None, :]))
 
-    @cached_property
-    def _displacements(self) -> RowSampler:
-        return RowSampler(sparse.csr_array(self.displacement.reshape(1, -1)))
-
     @property
     def within(self) -> Floats:
-        """Share of the kernel that stays in the grid, for a parent in each niche, (n,)."""
-        # Correlation of the kernel with the grid's indicator.
-        flipped = np.flip(self.displacement)
-        stays = fftconvolve(flipped, np.ones(self.niches.shape), mode="valid")
-        within: Floats = np.maximum(stays.ravel(), self.displacement[tuple(k - 1 for k in self.niches.shape)])
-        return within
+        """Weight of all niches together as children of a parent in each niche, (n,)."""
+        return self.displacement.within
 
     def _sample_displaced(self, parent: Ints, rng: np.random.Generator) -> Ints:
         n = len(self.niches)
-        shape = np.array(self.niches.shape)
         child = np.full(parent.size, n, np.int64)
         outsiders = parent >= n
         child[outsiders] = _draw(self._destinations, int(outsiders.sum()), rng)
         open_ = np.flatnonzero(~outsiders & (rng.random(parent.size) >= self.leaving))
-        # Drawing again whatever lands off the grid conditions the kernel on staying in it.
-        while open_.size:
-            cells = np.stack(np.unravel_index(parent[open_], self.niches.shape), axis=1)
-            moves = _draw(self._displacements, open_.size, rng)
-            step = np.stack(np.unravel_index(moves, self.displacement.shape), axis=1) - (shape - 1)
-            landed = cells + step
-            stays = ((landed >= 0) & (landed < shape)).all(axis=1)
-            child[open_[stays]] = np.ravel_multi_index(tuple(landed[stays].T), self.niches.shape)
-            open_ = open_[~stays]
+        child[open_] = self.displacement.sample(parent[open_], rng)
         return child
-
-
-def _cells_apart(niches: GridNiches, parent: Ints, child: Ints) -> tuple[Ints, ...]:
-    """Index into the displacement kernel for each pair of niches."""
-    start = np.unravel_index(parent, niches.shape)
-    end = np.unravel_index(child, niches.shape)
-    return tuple((b - a + k - 1).astype(np.int64) for a, b, k in zip(start, end, niches.shape, strict=True))
 
 
 def _draw(sampler: RowSampler, size: int, rng: np.random.Generator) -> Ints:

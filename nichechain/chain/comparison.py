@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 from scipy.special import gammaln, softmax
 
+from nichechain.arguments import check_whole
 from nichechain.chain.base_measure import BaseMeasure
 from nichechain.chain.counts import TransitionCounts
 from nichechain.chain.estimators import Unvisited, estimate
@@ -109,6 +110,7 @@ def compare_estimators(counts: TransitionCounts, *, folds: int = 5, seed: int = 
     A log-likelihood on the births that are not impossible flatters an estimator that rules out
     many; ``difference`` compares it with the default on just these.
     """
+    check_whole(folds=folds)
     if folds < 2:
         raise NichechainError(f"folds is {folds}, but at least 2 are needed")
     families = families_of(counts)
@@ -125,7 +127,7 @@ def compare_estimators(counts: TransitionCounts, *, folds: int = 5, seed: int = 
         out = fold == turn
         seen = counts_of_families(families[~out], counts)
         for name, fit in fits.items():
-            foretold[name][out] = _probability(fit(seen), parent[out], child[out])
+            foretold[name][out] = probability_of(fit(seen), parent[out], child[out])
     reference = next(iter(foretold.values()))
     rows = tuple(_judge(name, p, reference, weight, elite) for name, p in foretold.items())
     return Comparison(rows, folds, elites, seed)
@@ -201,7 +203,7 @@ def counts_of_families(families: Ints, counts: TransitionCounts) -> TransitionCo
     return TransitionCounts(pairs.matrix, counts.niches, pairs.visits, families)
 
 
-def _probability(chain: NicheChain, parent: Ints, child: Ints) -> Floats:
+def probability_of(chain: NicheChain, parent: Ints, child: Ints) -> Floats:
     """T_ij of some pairs, without making a T that may be dense."""
     posterior = chain.posterior
     if posterior is None:

@@ -11,14 +11,15 @@ import pyarrow as pa
 from numpy.typing import NDArray
 from scipy import stats
 
-from nichechain.births import NONE
+from nichechain.arguments import check_whole
+from nichechain.births import NONE, check_columns
 from nichechain.chain.base_measure import BaseMeasure
 from nichechain.chain.counts import TransitionCounts
 from nichechain.chain.empirical_bayes import design_effect, most_likely
 from nichechain.chain.posterior import DirichletPosterior
 from nichechain.coverage import check_lengths, expected_coverage, rarefied_coverage
 from nichechain.errors import NichechainError
-from nichechain.niches import GridNiches
+from nichechain.niches import Niches
 from nichechain.randomness import Purpose, keyed
 
 Floats = NDArray[np.float64]
@@ -91,7 +92,7 @@ class Contrast:
 def contrast(
     first: pa.Table,
     second: pa.Table,
-    niches: GridNiches,
+    niches: Niches,
     *,
     l: int = 5,  # noqa: E741
     lineages: int = 100,
@@ -106,7 +107,7 @@ def contrast(
     ----------
     first, second : pyarrow.Table
         Columns of :mod:`nichechain.births`.
-    niches : GridNiches
+    niches : Niches
         The niches of both.
     l, lineages : int
         Generations and number U of lineages.
@@ -139,6 +140,7 @@ def contrast(
     times Student's quantile, and for few runs r the spread is corrected by √(r/(r − 1)).
     """
     check_lengths(l, lineages)
+    check_whole(resamples=resamples, draws=draws, min_births=min_births)
     for name, number, least in (
         ("resamples", resamples, 2),
         ("draws", draws, 1),
@@ -204,7 +206,7 @@ class _Side:
 
     Parameters
     ----------
-    niches : GridNiches
+    niches : Niches
     parent, child, elite, cluster : (N,) int64 arrays
         Births that did not fail; ``NONE`` for a null parent, and for the cluster of a birth that
         is in every resample.
@@ -212,7 +214,7 @@ class _Side:
     clusters : int
     """
 
-    niches: GridNiches
+    niches: Niches
     parent: Ints
     child: Ints
     elite: Ints
@@ -221,7 +223,8 @@ class _Side:
     clusters: int
 
     @classmethod
-    def of(cls, births: pa.Table, niches: GridNiches) -> _Side:
+    def of(cls, births: pa.Table, niches: Niches) -> _Side:
+        check_columns(births, "run", "parent_uid", "parent_niche", "child_niche")
         parent, child, uid, run = (
             births[name].fill_null(NONE).to_numpy().astype(np.int64)
             for name in ("parent_niche", "child_niche", "parent_uid", "run")
@@ -247,12 +250,13 @@ class _Side:
             # Initial births of a single run are nobody's children, and stay.
             n = np.where(self.cluster == NONE, 1, multiplicity[self.cluster])
         moved = self.parent != NONE
-        visits = np.zeros(self.niches.states, np.int64)
-        np.add.at(visits, self.child, n)
         if multiplicity is None:
             counts = TransitionCounts.from_births(self.parent, self.child, self.niches, elite=self.elite)
         else:
             counts = TransitionCounts.from_pairs(self.parent[moved], self.child[moved], self.niches, n[moved])
+        # The counts have been made, so every child's state is one of these niches.
+        visits = np.zeros(self.niches.states, np.int64)
+        np.add.at(visits, self.child, n)
         return replace(counts, visits=visits)
 
     def resampled(self, resamples: int, seed: int, side: int) -> Iterator[tuple[Ints, np.random.Generator]]:

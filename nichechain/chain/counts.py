@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
+from nichechain.arguments import as_floats, as_whole
 from nichechain.births import NONE
 from nichechain.errors import NichechainError
-from nichechain.niches import GridNiches
+from nichechain.niches import Niches
 
 Ints = NDArray[np.int64]
 
@@ -26,7 +27,7 @@ class TransitionCounts:
     ----------
     matrix : (S, S) scipy.sparse.csr_array of int64
         ``matrix[i, j]`` children in state j of parents in state i.
-    niches : GridNiches
+    niches : Niches
     visits : (S,) int64 array
         Births in each state, initial ones included.
     families : (F, 4) int64 array
@@ -35,13 +36,13 @@ class TransitionCounts:
     """
 
     matrix: sparse.csr_array
-    niches: GridNiches
+    niches: Niches
     visits: Ints
     families: Ints = field(default_factory=lambda: np.empty((0, 4), np.int64))
 
     @classmethod
     def from_births(
-        cls, parent: ArrayLike, child: ArrayLike, niches: GridNiches, *, elite: ArrayLike | None = None
+        cls, parent: ArrayLike, child: ArrayLike, niches: Niches, *, elite: ArrayLike | None = None
     ) -> TransitionCounts:
         """Counts of births.
 
@@ -50,7 +51,7 @@ class TransitionCounts:
         parent, child : (N,) ints
             States of the parent and of the child, -1 for null: a birth without a parent is only
             a visit, and one without a niche failed and is left out.
-        niches : GridNiches
+        niches : Niches
             The niches that the numbers belong to.
         elite : (N,) ints, optional
             Number of the parent, which tells siblings from cousins; -1 where it is not known.
@@ -60,14 +61,14 @@ class TransitionCounts:
         NichechainError
             If the lengths differ or a state does not exist.
         """
-        i, j = np.asarray(parent, np.int64), np.asarray(child, np.int64)
+        i, j = as_whole("parent", parent), as_whole("child", child)
         _check_pairs(i, j, niches, lowest=NONE)
         moved = (i != NONE) & (j != NONE)
         counts = cls.from_pairs(i[moved], j[moved], niches)
         counts = replace(counts, visits=np.bincount(j[j != NONE], minlength=niches.states))
         if elite is None:
             return counts
-        uid = np.asarray(elite, np.int64)
+        uid = as_whole("elite", elite)
         if uid.shape != i.shape:
             raise NichechainError(f"elites have shape {uid.shape} and parents {i.shape}, but must be alike")
         # Children whose parents are not known are not siblings for that.
@@ -77,7 +78,7 @@ class TransitionCounts:
 
     @classmethod
     def from_pairs(
-        cls, parent: ArrayLike, child: ArrayLike, niches: GridNiches, n: ArrayLike | None = None
+        cls, parent: ArrayLike, child: ArrayLike, niches: Niches, n: ArrayLike | None = None
     ) -> TransitionCounts:
         """Counts of pairs of states.
 
@@ -85,7 +86,7 @@ class TransitionCounts:
         ----------
         parent, child : (N,) ints
             States of parents and of their children.
-        niches : GridNiches
+        niches : Niches
             The niches that the numbers belong to.
         n : (N,) ints, optional
             How many births each pair stands for; by default one.
@@ -95,7 +96,7 @@ class TransitionCounts:
         NichechainError
             If the lengths differ, a state does not exist or a number is negative.
         """
-        i, j = np.asarray(parent, np.int64), np.asarray(child, np.int64)
+        i, j = as_whole("parent", parent), as_whole("child", child)
         _check_pairs(i, j, niches, lowest=0)
         size = np.ones(i.size, np.int64) if n is None else _multiplicities(n, i.shape)
         shape = (niches.states, niches.states)
@@ -155,7 +156,7 @@ class TransitionCounts:
 
 
 def _multiplicities(n: ArrayLike, shape: tuple[int, ...]) -> Ints:
-    given = np.asarray(n)
+    given = as_floats("n", n)
     if given.shape != shape:
         raise NichechainError(f"n has shape {given.shape}, but must have {shape}, one number for each pair")
     if not (np.isfinite(given).all() and (given >= 0).all() and (given == np.floor(given)).all()):
@@ -163,7 +164,7 @@ def _multiplicities(n: ArrayLike, shape: tuple[int, ...]) -> Ints:
     return given.astype(np.int64)
 
 
-def _check_pairs(parent: Ints, child: Ints, niches: GridNiches, *, lowest: int) -> None:
+def _check_pairs(parent: Ints, child: Ints, niches: Niches, *, lowest: int) -> None:
     if parent.shape != child.shape or parent.ndim != 1:
         raise NichechainError(
             f"parents have shape {parent.shape} and children {child.shape}, but must be alike"

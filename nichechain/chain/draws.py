@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from nichechain.arguments import as_floats
 from nichechain.chain.model import NicheChain, Transition
 from nichechain.errors import NichechainError
 from nichechain.niches import Niche
@@ -85,8 +86,8 @@ def generations(l: int, convention: str) -> int:  # noqa: E741  # the paper's na
     return l + 1 if convention == "procedure" else l
 
 
-def _distribution(offspring: ArrayLike | None, chain: NicheChain) -> Floats:
-    given = np.asarray(offspring, np.float64)
+def _distribution(offspring: ArrayLike, chain: NicheChain) -> Floats:
+    given = as_floats("offspring", offspring)
     if given.shape not in ((chain.n_niches,), (chain.states,)):
         raise NichechainError(
             f"offspring has shape {given.shape}, but must be ({chain.n_niches},), one share per niche"

@@ -194,12 +194,12 @@ def _without_own(counts: TransitionCounts, parent: Ints, child: Ints) -> Floats:
     gone = births - kept
     gone[n:] = 0.0
     leaving = (gone.sum() - gone) / np.maximum(1.0, (gone + kept).sum() - gone - kept)
-    # A row's own births inside are all among those that its kernel keeps in the grid.
     inside = (parent < n) & (child < n)
     rows = parent[inside]
-    within = base.within[rows] * (kept.sum() + 0.5)
-    share = displaced[inside] / (1.0 - base.leaving) * within - count[inside]
+    share, whole = base.displacement.without_parent(
+        counts, rows, child[inside], displaced[inside] / (1.0 - base.leaving)
+    )
     displaced = np.where(parent < n, leaving[parent], destination)
-    displaced[inside] = (1.0 - leaving[rows]) * share / (within - kept[rows])
+    displaced[inside] = (1.0 - leaving[rows]) * share / whole
     # Where only the row itself ever did such a thing, the uniform share is all there is.
     return np.maximum([destination, displaced, uniform], 1e-12)

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from nichechain.arguments import check_numbers
 from nichechain.chain.base_measure import BaseMeasure
 from nichechain.chain.counts import TransitionCounts
 from nichechain.chain.empirical_bayes import design_effect, most_likely
@@ -161,6 +162,7 @@ def with_posterior(counts: TransitionCounts, posterior: DirichletPosterior, name
 
 
 def _positive(strength: float) -> float:
+    check_numbers(strength=strength)
     if not (np.isfinite(strength) and strength > 0):
         raise NichechainError(f"strength is {strength}, but must be a positive number")
     return float(strength)

@@ -6,15 +6,16 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from nichechain.births import NONE
+from nichechain.arguments import check_whole
+from nichechain.births import NONE, check_columns
 from nichechain.chain.counts import TransitionCounts
 from nichechain.errors import NichechainError
-from nichechain.niches import GridNiches
+from nichechain.niches import Niches
 
 
 def counts_of(
     births: pa.Table,
-    niches: GridNiches,
+    niches: Niches,
     *,
     run: int | None = None,
     steps: tuple[int, int] | None = None,
@@ -26,7 +27,7 @@ def counts_of(
     ----------
     births : pyarrow.Table
         Columns of :mod:`nichechain.births`; elites of different runs are kept apart.
-    niches : GridNiches
+    niches : Niches
         The niches that the states of the births belong to.
     run : int, optional
         Only births of this run.
@@ -46,10 +47,14 @@ def counts_of(
     NichechainError
         If there is no such run, the window is empty, or births do not say what is asked about.
     """
+    check_columns(births, "run", "parent_uid", "parent_niche", "child_niche", "step", "accepted")
     if run is not None:
         births = births.filter(pc.equal(births["run"], _run(births, run)))
     if steps is not None:
+        if not isinstance(steps, tuple) or len(steps) != 2:
+            raise NichechainError(f"steps are {steps!r}, but must be a window such as (0, 100)")
         first, end = steps
+        check_whole(first_step=first, end_of_steps=end)
         if not 0 <= first < end:
             raise NichechainError(f"steps are {first} to {end}, but must be a window such as (0, 100)")
         step = _said(births, "step", "their step")

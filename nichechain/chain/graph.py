@@ -6,6 +6,7 @@ import networkx as nx
 import numpy as np
 from scipy import sparse
 
+from nichechain.arguments import check_numbers
 from nichechain.chain.model import NicheChain
 from nichechain.errors import NichechainError
 
@@ -37,6 +38,7 @@ def reachability_graph(chain: NicheChain, threshold: float = 0.05) -> nx.DiGraph
     NichechainError
         If the threshold is not a probability.
     """
+    check_numbers(threshold=threshold)
     if not 0.0 <= threshold <= 1.0:
         raise NichechainError(f"threshold is {threshold}, but must be between 0 and 1")
     transition = sparse.csr_array(chain.T)

@@ -11,7 +11,7 @@ from scipy import sparse
 
 from nichechain.chain.operator import PooledTransition
 from nichechain.errors import NichechainError
-from nichechain.niches import GridNiches, Niche
+from nichechain.niches import Niche, Niches
 
 if TYPE_CHECKING:
     import networkx as nx
@@ -35,7 +35,7 @@ class NicheChain:
     outside : int, optional
         Number of the state of behaviors out of bounds, which must be the last; it is no niche.
         By default there is none.
-    niches : GridNiches, optional
+    niches : Niches, optional
         What the states are; lets niches be named by grid index.
     posterior : DirichletPosterior, optional
         What is known of T where it was estimated.
@@ -55,7 +55,7 @@ class NicheChain:
         transition: ArrayLike | sparse.sparray | sparse.spmatrix | PooledTransition | None = None,
         *,
         outside: int | None = None,
-        niches: GridNiches | None = None,
+        niches: Niches | None = None,
         posterior: DirichletPosterior | None = None,
         counts: TransitionCounts | None = None,
         estimator: str = "given",

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import fft, sparse
+from scipy import sparse
 
 from nichechain.chain.base_measure import BaseMeasure
+from nichechain.chain.displacement import Displacement
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -21,11 +21,11 @@ _COLUMNS = 32
 
 @dataclass(frozen=True)
 class PooledTransition:
-    """Rows of T as a sum of parts: sparse, of low rank, and a stencil over the grid.
+    """Rows of T as a sum of parts: sparse, of low rank, and one weight for each displacement.
 
-    T_ij is ``kept[i, j] + (shares @ pools)[i, j] + spread[i] * kernel[displacement from i to j]``,
-    the last where j is a niche. It multiplies from either side; products with the stencil are
-    made with fast Fourier transforms, exact to rounding.
+    T_ij is ``kept[i, j] + (shares @ pools)[i, j] + spread[i] * K_ij``, the last where j is a niche and
+    K is that of a :class:`Displacement`. It multiplies from either side; products with K on a grid
+    are made with fast Fourier transforms, exact to rounding.
 
     Parameters
     ----------
@@ -36,7 +36,8 @@ class PooledTransition:
         0 for the outside state, which nothing is displaced from.
     cell : (m,) int64 array
         Niche that each row is displaced from.
-    kernel : float64 array of shape (2 k - 1, ...) for k cells along an axis
+    displacement : Displacement, optional
+        Needed where ``spread`` is not all 0.
     """
 
     kept: sparse.csr_array
@@ -44,7 +45,7 @@ class PooledTransition:
     pools: Floats
     spread: Floats
     cell: Ints
-    kernel: Floats
+    displacement: Displacement | None
 
     # Arrays leave products with this to its own method.
     __array_ufunc__ = None
@@ -82,7 +83,7 @@ class PooledTransition:
         """The map ``kept[i, j] + share[i] * pool[j]``, of an (S, S) array and two (S,) arrays."""
         nowhere = np.zeros(share.size)
         cell = np.zeros(share.size, np.int64)
-        return cls(kept, share[:, None], pool[None, :], nowhere, cell, np.ones(1))
+        return cls(kept, share[:, None], pool[None, :], nowhere, cell, None)
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -103,10 +104,11 @@ class PooledTransition:
     def __matmul__(self, other: Floats) -> Floats:
         """Product with an (S,) or (S, c) array."""
         product: Floats = self.kept @ other + self.shares @ (self.pools @ other)
-        if self.spread.any():
+        if self.displacement is not None and self.spread.any():
+            n = len(self.displacement.within)
             columns, result = other.reshape(len(other), -1), product.reshape(len(product), -1)
             for block in _blocks(columns.shape[1]):
-                near = self._stencil(columns[: self._niches, block].T, self._spectrum)
+                near = self.displacement.to_parents(columns[:n, block].T)
                 result[:, block] += self.spread[:, None] * near.T[self.cell]
         return product
 
@@ -114,13 +116,14 @@ class PooledTransition:
         """Product of an (m,) or (c, m) array, or of a sparse (c, m) array, with this."""
         left = other if isinstance(other, np.ndarray) else other.toarray()
         product: Floats = left @ self.kept + (left @ self.shares) @ self.pools
-        if self.spread.any():
+        if self.displacement is not None and self.spread.any():
+            n = len(self.displacement.within)
             rows, result = left.reshape(-1, left.shape[-1]), product.reshape(-1, product.shape[-1])
             for block in _blocks(len(rows)):
                 # Several rows may start from one niche, so that they have to be added up.
-                weight = np.zeros((len(rows[block]), self._niches))
+                weight = np.zeros((len(rows[block]), n))
                 np.add.at(weight.T, self.cell, (rows[block] * self.spread).T)
-                result[block, : self._niches] += self._stencil(weight, self._spectrum.conj())
+                result[block, :n] += self.displacement.to_children(weight)
         return product
 
     def toarray(self) -> Floats:
@@ -128,41 +131,10 @@ class PooledTransition:
         whole: Floats = self.kept.toarray()
         whole += self.shares @ self.pools
         for row in np.flatnonzero(self.spread):
-            start = np.unravel_index(self.cell[row], self._grid)
-            seen = tuple(slice(k - 1 - i, 2 * k - 1 - i) for i, k in zip(start, self._grid, strict=True))
-            whole[row, : self._niches] += self.spread[row] * self.kernel[seen].ravel()
+            assert self.displacement is not None
+            near = self.displacement.row(int(self.cell[row]))
+            whole[row, : near.size] += self.spread[row] * near
         return whole
-
-    @property
-    def _grid(self) -> tuple[int, ...]:
-        return tuple((side + 1) // 2 for side in self.kernel.shape)
-
-    @property
-    def _niches(self) -> int:
-        return int(np.prod(self._grid))
-
-    @property
-    def _padded(self) -> list[int]:
-        # No displacement within the grid wraps around a torus of this size onto another cell.
-        return [fft.next_fast_len(side, real=True) for side in self.kernel.shape]
-
-    @cached_property
-    def _spectrum(self) -> NDArray[np.complex128]:
-        """Transform of the kernel as a correlation takes it: backwards, no displacement first."""
-        torus = np.zeros(self._padded)
-        torus[tuple(slice(side) for side in self.kernel.shape)] = np.flip(self.kernel)
-        torus = np.roll(torus, [1 - k for k in self._grid], axis=tuple(range(torus.ndim)))
-        transformed: NDArray[np.complex128] = fft.rfftn(torus)
-        return transformed
-
-    def _stencil(self, values: Floats, spectrum: NDArray[np.complex128]) -> Floats:
-        """Each row of values (c, n) correlated or convolved with the kernel, on the grid."""
-        axes = tuple(range(1, len(self._grid) + 1))
-        moved = fft.rfftn(values.reshape(-1, *self._grid), self._padded, axes=axes)
-        moved *= spectrum
-        whole = fft.irfftn(moved, self._padded, axes=axes, overwrite_x=True)
-        within: Floats = whole[(slice(None), *(slice(k) for k in self._grid))]
-        return within.reshape(len(values), -1)
 
 
 def _blocks(size: int) -> list[slice]:

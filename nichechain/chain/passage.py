@@ -182,7 +182,13 @@ def quasi_stationary_distribution(chain: NicheChain, states: Target | None = Non
 
 def _states(chain: NicheChain, target: Target) -> Ints:
     """Sorted states of a target."""
-    several = [target] if isinstance(target, (int, np.integer, tuple)) else list(target)
+    if isinstance(target, (list, np.ndarray)) or (
+        isinstance(target, Sequence) and not isinstance(target, (tuple, str))
+    ):
+        several = list(target)
+    else:
+        # A tuple is the index of one niche; what is no niche at all is for the chain to refuse.
+        several = [target]  # type: ignore[list-item]
     if not several:
         raise NichechainError("the target is empty, but must have at least one niche")
     return np.unique([_state(chain, niche) for niche in several])

@@ -9,6 +9,7 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy import sparse
 
+from nichechain.arguments import check_whole
 from nichechain.chain.draws import generations, transition_draws
 from nichechain.chain.model import Matrix, NicheChain
 from nichechain.coverage import check_lengths, expected_coverage
@@ -73,6 +74,7 @@ def where_to_sample(
     m / (m + e α), as the posterior mean of a Dirichlet row is linear in what is seen. Memory and
     time are those of dense (S, S) matrices.
     """
+    check_whole(births=births, draws=draws)
     if births < 1:
         raise NichechainError(f"births is {births}, but at least 1 is needed")
     if draws < 2:

@@ -11,6 +11,7 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy.stats import spearmanr
 
+from nichechain.arguments import as_floats, check_seed, check_whole
 from nichechain.chain.counts import TransitionCounts
 from nichechain.chain.estimators import Estimator, estimate
 from nichechain.errors import NichechainError
@@ -156,11 +157,15 @@ def rank_stability(
     leaving some out would have changed, not how far all of them are from the truth. The halves,
     which share nothing, tell more of that (Spearman 1910, Brown 1910).
     """
-    parts = np.array(sorted(fractions), np.float64)
+    parts = np.sort(np.atleast_1d(as_floats("fractions", fractions)), axis=None)
     if not parts.size or not ((parts > 0) & (parts < 1)).all():
-        raise NichechainError(f"fractions are {tuple(fractions)}, but must be between 0 and 1")
+        raise NichechainError(f"fractions are {tuple(parts.tolist())}, but must be between 0 and 1")
     if thin not in get_args(Thin):
         raise NichechainError(f"thin is {thin!r}, but must be one of {', '.join(get_args(Thin))}")
+    check_whole(repeats=repeats, min_births=min_births)
+    check_seed(seed)
+    if min_births < 0:
+        raise NichechainError(f"min_births is {min_births}, but must not be negative")
     if repeats < 1:
         raise NichechainError(f"repeats is {repeats}, but at least 1 is needed")
     ranked = np.flatnonzero(counts.births[: len(counts.niches)] >= min_births)

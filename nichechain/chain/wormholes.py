@@ -9,6 +9,7 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy.special import betaincc
 
+from nichechain.arguments import check_numbers
 from nichechain.chain.base_measure import BaseMeasure
 from nichechain.chain.counts import TransitionCounts
 from nichechain.chain.model import NicheChain
@@ -72,6 +73,7 @@ def wormholes(
     """
     if beyond not in get_args(Beyond):
         raise NichechainError(f"beyond is {beyond!r}, but must be one of {', '.join(get_args(Beyond))}")
+    check_numbers(times=times, expected_false=expected_false)
     if not (np.isfinite(times) and times >= 1.0):
         raise NichechainError(f"times is {times}, but must be at least 1")
     if not expected_false >= 0.0:
@@ -140,6 +142,7 @@ def _expected(
     this_way = displacement / staying * all_ways
     staying_else = 1.0 / (1.0 + base.leaving / staying * inside / np.maximum(inside - count, 1.0))
     # Half a birth, spread over all niches, makes nothing quite impossible.
-    so_far = (np.maximum(this_way - count, 0.0) + 0.5 / n) / (all_ways - count + 0.5)
+    pair, row = base.displacement.own(parent, child)
+    so_far = (np.maximum(this_way - count * pair, 0.0) + 0.5 / n) / (all_ways - count * row + 0.5)
     there = (np.maximum(destination * total - count, 0.0) + 0.5 / n) / (total - count + 0.5)
     return staying_else * so_far, there

@@ -9,7 +9,7 @@ import sys
 from collections.abc import Sequence
 
 COMMANDS = {
-    "domains": "what can be searched",
+    "domains": "what can be searched, with bounds, genotype length and speed",
     "build": "fill an archive: MAP-Elites that records who was born where",
     "info": "what is in an archive, and what made it",
     "evolvability": "l-evolvability of niches, or of an elite",
@@ -22,7 +22,7 @@ COMMANDS = {
     "import": "births of another program's search, from CSV or Parquet",
     "plot": "heat maps of an archive and graphs of which niches lead to which",
     "explore": "a page on which one clicks a niche and sees where its descendants go",
-    "sweep": "how many niches a grid should have",
+    "sweep": "how many niches the births of an archive fill: too few, too many, and a suggestion",
     "validate": "whether the chain is one, and whether its predictions come true",
 }
 

@@ -9,6 +9,7 @@ from nichechain.plots.matrix import plot_transitions
 from nichechain.plots.reach import plot_reach
 from nichechain.plots.reachability import plot_reachability
 from nichechain.plots.stability import plot_stability
+from nichechain.plots.sweep import plot_filling, plot_scores, plot_surprise
 from nichechain.plots.uncertainty import plot_uncertainty
 from nichechain.plots.walks import draw_study, plot_runs, plot_walks
 from nichechain.plots.wormholes import plot_wormholes
@@ -19,13 +20,16 @@ __all__ = [
     "plot_classes",
     "plot_elites",
     "plot_evolvability",
+    "plot_filling",
     "plot_generations",
     "plot_lineages",
     "plot_reach",
     "plot_reachability",
     "plot_reached",
     "plot_runs",
+    "plot_scores",
     "plot_stability",
+    "plot_surprise",
     "plot_transitions",
     "plot_transitions_by_class",
     "plot_uncertainty",

@@ -10,7 +10,8 @@ from scipy import sparse
 
 from nichechain.chain.analysis import communicating_classes, recurrent_classes
 from nichechain.errors import NichechainError
-from nichechain.plots.style import EDGE, EMPTY, INK, LONG_JUMP, START, behavior_axes, colorbar, edges, key
+from nichechain.plots.cells import cells_along, fill, hatch
+from nichechain.plots.style import EDGE, EMPTY, INK, LONG_JUMP, START, behavior_axes, colorbar, key
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -51,7 +52,7 @@ def plot_classes(archive: Archive, chain: NicheChain, ax: Axes, *, threshold: fl
     NichechainError
         If the threshold is out of range or behavior does not have two axes.
     """
-    from matplotlib.colors import ListedColormap
+    from matplotlib.colors import ListedColormap, Normalize
     from matplotlib.patches import Patch
 
     classes = _by_size(chain, threshold)
@@ -67,25 +68,21 @@ def plot_classes(archive: Archive, chain: NicheChain, ax: Axes, *, threshold: fl
     colors = (*_COLORS, "#5f6a72", _SINGLE, "#ffffff")
     behavior_axes(ax, archive)
     ax.set_facecolor(EMPTY)
-    x, y = edges(archive.niches)
-    grid = np.ma.masked_invalid(archive.niches.as_grid(kind[:n]).T)
     # Borders in grey, or a white niche would not be seen.
-    ax.pcolormesh(
-        x,
-        y,
-        grid,
-        cmap=ListedColormap(colors),
-        vmin=-0.5,
-        vmax=len(colors) - 0.5,
-        edgecolors="#bbbbbb",
-        linewidth=_BORDER / max(archive.niches.shape),
+    fill(
+        ax,
+        archive.niches,
+        kind[:n],
+        ListedColormap(colors),
+        Normalize(-0.5, len(colors) - 0.5),
+        edge="#bbbbbb",
+        width=_BORDER / cells_along(archive.niches),
     )
-    closed = np.full(n, np.nan)
+    closed = np.zeros(n, bool)
     for states in recurrent_classes(chain, threshold=threshold):
         inside = states[(states < n) & (births[states] > 0)]
-        closed[inside] = 1.0
-    held = np.ma.masked_invalid(archive.niches.as_grid(closed).T)
-    ax.pcolor(x, y, held, facecolor="none", hatch="////", edgecolor="#ffffffa0", linewidth=0)
+        closed[inside] = True
+    hatch(ax, archive.niches, closed, "#ffffffa0")
     handles = [
         Patch(color=color, label=_size(states, n))
         for color, states in zip(_COLORS, large[: len(_COLORS)], strict=False)
@@ -98,7 +95,7 @@ def plot_classes(archive: Archive, chain: NicheChain, ax: Axes, *, threshold: fl
         number = int((kind[:n] == code).sum())
         if number:
             handles.append(Patch(facecolor=colors[code], edgecolor="#bbbbbb", label=f"{text}: {number}"))
-    if np.isfinite(closed).any():
+    if closed.any():
         handles.append(Patch(facecolor="#888888", hatch="////", edgecolor="white", label="never left"))
     ax.set_title(f"Communicating classes: {len(large)} of several states")
     key(ax, *handles, note=_note(chain, threshold))

@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from nichechain.plots.style import EMPTY, behavior_axes, colorbar, edges, key
+from nichechain.plots.cells import fill, hatch
+from nichechain.plots.style import EMPTY, behavior_axes, colorbar, key, on_map
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.collections import QuadMesh
+    from matplotlib.collections import Collection
     from matplotlib.colors import Normalize
 
     from nichechain.archive import Archive
@@ -37,7 +38,8 @@ def plot_elites(archive: Archive, ax: Axes) -> Axes:
     values = np.full(len(archive.niches), np.nan)
     values[elites.niche[inside]] = elites.objective[inside]
     mesh = _map(ax, archive, values, "viridis")
-    ax.plot(*elites.behavior[inside].T, ".", color="white", markersize=3, markeredgecolor="none", alpha=0.9)
+    x, y = on_map(elites.behavior[inside])
+    ax.plot(x, y, ".", color="white", markersize=3, markeredgecolor="none", alpha=0.9)
     colorbar(ax, mesh, archive.meta.facts.objective_name)
     ax.set_title(f"Elites: {archive.filled} of {len(archive.niches)} niches filled")
     key(ax, Line2D([], [], marker=".", linestyle="none", color="#777777", label="behavior of an elite"))
@@ -90,9 +92,7 @@ def plot_evolvability(archive: Archive, scores: NicheEvolvability, ax: Axes, *, 
     births = archive.counts.births[: len(archive.niches)]
     values = np.where(births > 0, scores.value, np.nan)
     mesh = _map(ax, archive, values, "magma")
-    few = np.where((births > 0) & (births < min_births), 1.0, np.nan)
-    x, y = edges(archive.niches)
-    ax.pcolor(x, y, _grid(archive, few), facecolor="none", hatch="////", edgecolor="#ffffff80", linewidth=0)
+    hatch(ax, archive.niches, (births > 0) & (births < min_births), "#ffffff80")
     colorbar(ax, mesh, f"niches reached in {scores.l} generations")
     ax.set_title(f"{scores.l}-evolvability, {scores.lineages} lineages")
     hatched = Patch(facecolor="#888888", hatch="////", edgecolor="white", label=f"under {min_births} births")
@@ -106,16 +106,8 @@ def _map(
     values: NDArray[np.float64],
     colors: str,
     norm: Normalize | None = None,
-) -> QuadMesh:
+) -> Collection:
     """Values of all niches (n,) as colours; NaN is an empty niche."""
     behavior_axes(ax, archive)
     ax.set_facecolor(EMPTY)
-    x, y = edges(archive.niches)
-    return ax.pcolormesh(
-        x, y, _grid(archive, values), cmap=colors, norm=norm, edgecolors="white", linewidth=0.3
-    )
-
-
-def _grid(archive: Archive, values: NDArray[np.float64]) -> np.ma.MaskedArray:
-    # Axis 0 of the grid is x, but rows of a picture run along y.
-    return np.ma.masked_invalid(archive.niches.as_grid(values).T)
+    return fill(ax, archive.niches, values, colors, norm)

@@ -8,6 +8,8 @@ import numpy as np
 from scipy import sparse
 
 from nichechain.errors import NichechainError
+from nichechain.niches import GridNiches
+from nichechain.plots.cells import cells_along
 from nichechain.plots.style import EMPTY, INK, colorbar
 
 if TYPE_CHECKING:
@@ -15,13 +17,16 @@ if TYPE_CHECKING:
 
     from nichechain.archive import Archive
     from nichechain.chain import NicheChain
+    from nichechain.niches import Niches
 
 # Probabilities below this are left white.
 _SMALLEST = 1e-3
 
 
 def plot_transitions(archive: Archive, chain: NicheChain, ax: Axes) -> Axes:
-    """T between the states that births speak of, in the order of the grid, outside last.
+    """T between the states that births speak of, in the order of the grid or of the first axis.
+
+    The outside state comes last.
 
     Parameters
     ----------
@@ -41,8 +46,8 @@ def plot_transitions(archive: Archive, chain: NicheChain, ax: Axes) -> Axes:
     from matplotlib.colors import LogNorm
 
     counts = archive.counts
-    rows = np.flatnonzero(counts.births)
-    columns = np.flatnonzero(counts.visits)
+    rows = _in_order(archive.niches, np.flatnonzero(counts.births))
+    columns = _in_order(archive.niches, np.flatnonzero(counts.visits))
     if not rows.size:
         raise NichechainError(f"{archive.folder} has no births with a parent: there is no T to draw")
     shown = sparse.csr_array(chain.T)[rows][:, columns].toarray()
@@ -72,16 +77,36 @@ def plot_transitions(archive: Archive, chain: NicheChain, ax: Axes) -> Axes:
     return ax
 
 
+def _in_order(niches: Niches, states: np.ndarray) -> np.ndarray:
+    """States in the order of their places along axis 0; outside comes after."""
+    if isinstance(niches, GridNiches):
+        return states
+    along = np.append(niches.centers[:, 0], np.inf)
+    ordered: np.ndarray = states[np.argsort(along[states], kind="stable")]
+    return ordered
+
+
+def _columns(niches: Niches) -> int:
+    """Columns along axis 0: those of a grid, or slices as wide as a niche."""
+    return niches.shape[0] if isinstance(niches, GridNiches) else cells_along(niches)
+
+
 def _first_index(archive: Archive, states: np.ndarray) -> np.ndarray:
-    """Position of each state along axis 0 of the grid; outside comes after."""
+    """Column of each state along axis 0; outside comes after."""
     niches = archive.niches
-    return np.array([niches.shape[0] if s == len(niches) else niches.index(int(s))[0] for s in states])
+    columns = _columns(niches)
+    if isinstance(niches, GridNiches):
+        return np.array([columns if s == len(niches) else niches.index(int(s))[0] for s in states])
+    low, high = niches.bounds[0]
+    slices = np.minimum((niches.centers[:, 0] - low) / (high - low) * columns, columns - 1).astype(int)
+    found: np.ndarray = np.append(slices, columns)[states]
+    return found
 
 
 def _ticks(archive: Archive, states: np.ndarray) -> tuple[list[float], list[str]]:
     """A tick in the middle of the niches of each column of the grid, or of some of them."""
     first = _first_index(archive, states)
-    (low, high), cells = archive.niches.bounds[0], archive.niches.shape[0]
+    (low, high), cells = archive.niches.bounds[0], _columns(archive.niches)
     middles = {k: float(np.flatnonzero(first == k).mean()) for k in np.unique(first)}
     centers = {k: f"{low + (k + 0.5) * (high - low) / cells:.3g}" for k in range(cells)}
     labels = {k: centers.get(int(k), "outside") for k in middles}

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import numpy as np
-
-from nichechain.plots.style import EMPTY, INK, behavior_axes, colorbar, edges, key
+from nichechain.plots.cells import fill, frame
+from nichechain.plots.style import EMPTY, INK, behavior_axes, colorbar, key
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -40,33 +39,18 @@ def plot_reach(archive: Archive, reach: Reach, ax: Axes, *, niche: Niche | None 
         If there is no such niche, or behavior does not have two axes.
     """
     from matplotlib.colors import PowerNorm
-    from matplotlib.patches import Patch, Rectangle
+    from matplotlib.patches import Patch
 
     behavior_axes(ax, archive)
     ax.set_facecolor(EMPTY)
-    x, y = edges(archive.niches)
-    mesh = ax.pcolormesh(
-        x,
-        y,
-        # Axis 0 of the grid is x, but rows of a picture run along y.
-        archive.niches.as_grid(reach.at_least_one).T,
-        cmap="Blues",
-        norm=PowerNorm(0.5, 0.0, 1.0),
-        edgecolors="white",
-        linewidth=0.3,
-    )
+    mesh = fill(ax, archive.niches, reach.at_least_one, "Blues", PowerNorm(0.5, 0.0, 1.0))
     lineages = "the lineage" if reach.lineages == 1 else f"one of {reach.lineages} lineages"
     colorbar(ax, mesh, f"probability that {lineages} visits")
     handles = []
     whose = ""
     if niche is not None:
         state = archive.niches.flat(niche)
-        i, j = np.unravel_index(state, archive.niches.shape)
-        corner = float(x[i]), float(y[j])
-        size = float(x[1] - x[0]), float(y[1] - y[0])
-        # White below black is seen on any colour.
-        for color, width in (("white", 4.0), (INK, 2.0)):
-            ax.add_patch(Rectangle(corner, *size, fill=False, edgecolor=color, linewidth=width, zorder=8))
+        frame(ax, archive.niches, state)
         whose = f" from niche {archive.niches.label(state)}"
         handles.append(Patch(fill=False, edgecolor=INK, linewidth=2.0, label="the root's niche"))
     generations = "1 generation" if reach.l == 1 else f"{reach.l} generations"

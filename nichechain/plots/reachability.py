@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nichechain.plots.style import EDGE, EMPTY, FAINT, INK, LONG_JUMP, behavior_axes, colorbar, key
+from nichechain.plots.cells import borders
+from nichechain.plots.style import EDGE, FAINT, INK, LONG_JUMP, behavior_axes, colorbar, key
 
 if TYPE_CHECKING:
     import networkx as nx
@@ -42,10 +43,10 @@ def plot_reachability(archive: Archive, chain: NicheChain, ax: Axes, *, threshol
     """
     from matplotlib.lines import Line2D
 
-    behavior_axes(ax, archive)
+    behavior_axes(ax, archive, strip=False)
     graph = chain.graph(threshold)
     graph.remove_nodes_from([node for node, at in graph.nodes(data="position") if at is None])
-    _cells(ax, archive)
+    borders(ax, archive.niches)
     facts = archive.meta.facts
     back = None if facts.start is None else int(archive.niches.of([facts.start])[0])
     drawn = [edge for edge in graph.edges if graph.edges[edge]["count"]]
@@ -69,14 +70,6 @@ def plot_reachability(archive: Archive, chain: NicheChain, ax: Axes, *, threshol
         f"Reachability: {graph.number_of_nodes()} niches, {len(near)} transitions, {len(far)} long jumps"
     )
     return ax
-
-
-def _cells(ax: Axes, archive: Archive) -> None:
-    """Faint borders of the niches."""
-    (left, right), (bottom, top) = archive.niches.bounds
-    columns, rows = archive.niches.shape
-    ax.vlines(np.linspace(left, right, columns + 1), bottom, top, color=EMPTY, linewidth=0.5, zorder=0)
-    ax.hlines(np.linspace(bottom, top, rows + 1), left, right, color=EMPTY, linewidth=0.5, zorder=0)
 
 
 def _nodes(ax: Axes, graph: nx.DiGraph) -> None:

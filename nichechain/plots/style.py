@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from nichechain.errors import NichechainError
 
@@ -13,7 +14,8 @@ if TYPE_CHECKING:
     from matplotlib.cm import ScalarMappable
 
     from nichechain.archive import Archive
-    from nichechain.niches import GridNiches
+
+Floats = NDArray[np.float64]
 
 EMPTY = "#ececec"
 """A niche that nobody was born in."""
@@ -28,31 +30,46 @@ START = "#e8a33d"
 INK = "#333333"
 
 
-def behavior_axes(ax: Axes, archive: Archive) -> None:
-    """Label an Axes with the two axes of behavior, to scale, and mark the start.
+# Height of a strip that shows one axis of behavior, over its width.
+_STRIP = 0.18
+# Distance of the legend from the map, over the map's height.
+_LEGEND = 0.09
+
+
+def behavior_axes(ax: Axes, archive: Archive, *, strip: bool = True) -> None:
+    """Label an Axes with the one or two axes of behavior, to scale, and mark the start.
+
+    Parameters
+    ----------
+    ax : matplotlib.axes.Axes
+    archive : Archive
+    strip : bool
+        Whether what is drawn makes sense as a strip along one axis.
 
     Raises
     ------
     NichechainError
-        If behavior does not have two axes.
+        If behavior has more axes, or one where that makes no sense.
     """
     facts = archive.meta.facts
-    if len(facts.behavior_names) != 2:
-        raise NichechainError(f"behavior has {len(facts.behavior_names)} axes, but maps are drawn over 2")
-    (left, right), (bottom, top) = archive.niches.bounds
-    ax.set(
-        xlim=(left, right),
-        ylim=(bottom, top),
-        aspect="equal",
-        xlabel=f"{facts.behavior_names[0]} ({facts.unit})",
-        ylabel=f"{facts.behavior_names[1]} ({facts.unit})",
-    )
+    names = [f"{name} ({facts.unit})" for name in facts.behavior_names]
+    if len(names) > 2 or (len(names) == 1 and not strip):
+        raise NichechainError(
+            f"behavior has {len(names)} axes, but this is drawn over {'1 or 2' if strip else '2'}: "
+            "growth, transitions and transitions-by-class are drawn of any number"
+        )
+    if len(names) == 2:
+        (left, right), (bottom, top) = archive.niches.bounds
+        ax.set(xlim=(left, right), ylim=(bottom, top), aspect="equal", xlabel=names[0], ylabel=names[1])
+    else:
+        ax.set(xlim=archive.niches.bounds[0], ylim=(0.0, 1.0), yticks=[], xlabel=names[0])
+        ax.set_box_aspect(_STRIP)
     ax.tick_params(length=3, color=INK)
     for spine in ax.spines.values():
         spine.set_color("#999999")
     if facts.start is not None:
         ax.plot(
-            *facts.start,
+            *on_map(facts.start),
             marker="P",
             markersize=9,
             markerfacecolor=START,
@@ -65,11 +82,10 @@ def behavior_axes(ax: Axes, archive: Archive) -> None:
         )
 
 
-def edges(niches: GridNiches) -> tuple[np.ndarray, np.ndarray]:
-    """Borders of the cells along the two axes."""
-    (left, right), (bottom, top) = niches.bounds
-    columns, rows = niches.shape
-    return np.linspace(left, right, columns + 1), np.linspace(bottom, top, rows + 1)
+def on_map(behavior: ArrayLike) -> tuple[Floats, Floats]:
+    """Where behaviors (..., B) lie on a map; in the middle of a strip if they have one axis."""
+    places = np.moveaxis(np.asarray(behavior, np.float64), -1, 0)
+    return (places[0], places[1]) if len(places) > 1 else (places[0], np.full_like(places[0], 0.5))
 
 
 def colorbar(ax: Axes, mappable: ScalarMappable, label: str) -> None:
@@ -88,7 +104,7 @@ def key(ax: Axes, *handles: Any, note: str | None = None) -> None:
         legend = ax.legend(
             handles=shown,
             loc="upper center",
-            bbox_to_anchor=(0.5, -0.09),
+            bbox_to_anchor=(0.5, -_LEGEND / (ax.get_box_aspect() or 1.0)),
             ncols=2 if len(shown) == 4 else min(3, max(1, len(shown))),
             frameon=False,
             fontsize="small",

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nichechain.errors import NichechainError
-from nichechain.plots.style import EMPTY, behavior_axes, colorbar, edges, key
+from nichechain.plots.cells import fill
+from nichechain.plots.style import EMPTY, behavior_axes, colorbar, key
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -42,13 +43,7 @@ def plot_uncertainty(archive: Archive, scores: NicheEvolvability, ax: Axes) -> A
     behavior_axes(ax, archive)
     ax.set_facecolor(EMPTY)
     shown = np.where(births > 0, width, np.nan)
-    mesh = ax.pcolormesh(
-        *edges(archive.niches),
-        np.ma.masked_invalid(archive.niches.as_grid(shown).T),
-        cmap="cividis",
-        edgecolors="white",
-        linewidth=0.3,
-    )
+    mesh = fill(ax, archive.niches, shown, "cividis")
     colorbar(ax, mesh, "width of the 90 % interval (niches)")
     ax.set_title(f"Uncertainty: {np.median(width[births > 0]):.1f} niches in the middle")
     key(ax, note=f"{scores.estimator}; grey: never a parent")

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nichechain.plots.style import EMPTY, INK, behavior_axes, colorbar, edges, key
+from nichechain.plots.cells import fill
+from nichechain.plots.style import EMPTY, INK, behavior_axes, colorbar, key
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -48,19 +49,12 @@ def plot_wormholes(archive: Archive, found: pd.DataFrame, ax: Axes) -> Axes:
     from matplotlib.patches import FancyArrowPatch
     from matplotlib.patheffects import withStroke
 
-    behavior_axes(ax, archive)
+    behavior_axes(ax, archive, strip=False)
     ax.set_facecolor(EMPTY)
     visits = archive.counts.visits[: len(archive.niches)].astype(float)
-    shown = np.ma.masked_equal(archive.niches.as_grid(visits).T, 0.0)
+    shown = np.where(visits > 0, visits, np.nan)
     # Births in faint grey: where there are many, a jump means less.
-    ax.pcolormesh(
-        *edges(archive.niches),
-        shown,
-        cmap="Greys",
-        norm=LogNorm(1.0, 1000.0 * max(2.0, visits.max())),
-        edgecolors="white",
-        linewidth=0.3,
-    )
+    fill(ax, archive.niches, shown, "Greys", LogNorm(1.0, 1000.0 * max(2.0, visits.max())))
     flagged = found[found["wormhole"]].sort_values("exceeds", kind="stable")
     low = min(0.5, float(flagged["exceeds"].min())) if len(flagged) else 0.5
     scale = ScalarMappable(Normalize(low, 1.0), colormaps["plasma_r"])

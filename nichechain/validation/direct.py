@@ -20,7 +20,7 @@ from nichechain.births import NONE
 from nichechain.chain.model import Matrix, NicheChain
 from nichechain.coverage import expected_coverage, rarefied_coverage
 from nichechain.errors import NichechainError
-from nichechain.niches import GridNiches
+from nichechain.niches import Niches
 from nichechain.randomness import Purpose, keyed
 from nichechain.validation.rollouts import Lineages, niches_reached
 from nichechain.validation.simulate import RowSampler, simulate_lineages
@@ -147,7 +147,7 @@ class DirectCheck:
 
 
 def compare(
-    chain: NicheChain, lineages: Lineages, niches: GridNiches, *, draws: int = DRAWS, seed: int = 0
+    chain: NicheChain, lineages: Lineages, niches: Niches, *, draws: int = DRAWS, seed: int = 0
 ) -> DirectCheck:
     """Predict what the lineages reached, without looking at them.
 
@@ -158,7 +158,7 @@ def compare(
     ----------
     chain : NicheChain
     lineages : Lineages
-    niches : GridNiches
+    niches : Niches
     draws : int
         Draws of T, where the chain has a posterior.
     seed : int

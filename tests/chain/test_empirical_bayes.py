@@ -8,6 +8,7 @@ from scipy import sparse, stats
 
 from nichechain.chain.base_measure import BaseMeasure
 from nichechain.chain.counts import TransitionCounts
+from nichechain.chain.displacement import GridDisplacement
 from nichechain.chain.empirical_bayes import (
     _left_out,
     _without_own,
@@ -42,9 +43,8 @@ def _known_base(weights, shape=(10, 10)):
     destination = stats.zipf(1.3).pmf(1 + np.random.default_rng(3).permutation(niches.states))
     x, y = np.mgrid[1 - shape[0] : shape[0], 1 - shape[1] : shape[1]]
     kernel = np.exp(-(x**2 + y**2) / 4)
-    return BaseMeasure(
-        niches, destination / destination.sum(), kernel / kernel.sum(), 0.05, np.array(weights)
-    )
+    displacement = GridDisplacement(niches, kernel / kernel.sum())
+    return BaseMeasure(niches, destination / destination.sum(), displacement, 0.05, np.array(weights))
 
 
 @pytest.mark.parametrize("strength", [1.0, 5.0, 30.0])

@@ -97,9 +97,9 @@ def matplotlib_color(patch):
     return to_hex(patch.get_facecolor())
 
 
-def test_maps_need_two_axes_of_behavior(ax):
-    class Flat:
-        meta = type("Meta", (), {"facts": type("Facts", (), {"behavior_names": ("x",)})()})()
-
-    with pytest.raises(NichechainError, match="1 axes"):
-        behavior_axes(ax, Flat())
+@pytest.mark.parametrize(("names", "strip"), [("xyz", True), ("wxyz", True), ("x", False)])
+def test_maps_need_one_or_two_axes_of_behavior(ax, names, strip):
+    facts = type("Facts", (), {"behavior_names": tuple(names), "unit": "m"})()
+    space = type("Space", (), {"meta": type("Meta", (), {"facts": facts})()})()
+    with pytest.raises(NichechainError, match=f"{len(names)} axes"):
+        behavior_axes(ax, space, strip=strip)

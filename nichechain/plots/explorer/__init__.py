@@ -19,11 +19,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from nichechain.chain.displacement import GridDisplacement
 from nichechain.chain.draws import transition_draws
 from nichechain.chain.graph import LONG_JUMP
 from nichechain.chain.wormholes import wormholes
 from nichechain.coverage import check_lengths, coverage_by_generation
 from nichechain.errors import NichechainError
+from nichechain.niches import GridNiches
 
 if TYPE_CHECKING:
     from nichechain.archive import Archive
@@ -68,13 +70,15 @@ class CompactTransition:
     @classmethod
     def of(cls, chain: NicheChain) -> CompactTransition:
         """The transition matrix of a chain, its posterior mean where it is estimated with one."""
-        assert chain.niches is not None
+        assert isinstance(chain.niches, GridNiches)
         states, n = chain.states, chain.n_niches
         rest, spread = np.zeros(states), np.zeros(states)
         if chain.posterior is None:
             kernel = np.zeros(tuple(2 * k - 1 for k in chain.niches.shape))
             return cls._narrow(sparse.csr_array(chain.T), rest, np.zeros(states), spread, kernel)
         posterior, base = chain.posterior, chain.posterior.base
+        assert isinstance(base.displacement, GridDisplacement)
+        kernel = base.displacement.kernel
         known = np.asarray(posterior.weights.sum(axis=1)).ravel()
         prior = posterior.strength / (known + posterior.strength)
         kept = (sparse.diags_array(1.0 / (known + posterior.strength)) @ posterior.weights).tolil()
@@ -87,7 +91,7 @@ class CompactTransition:
                 kept[:n, n] = kept[:n, [n]].toarray().ravel() + prior[:n] * displaced * base.leaving
             # Nothing is displaced from outside: that row has a prior of its own.
             kept[[n]] = posterior.mean()[[n]]
-        return cls._narrow(kept.tocsr(), rest, shared / shared.sum(), spread, base.displacement)
+        return cls._narrow(kept.tocsr(), rest, shared / shared.sum(), spread, kernel)
 
     @classmethod
     def _narrow(
@@ -187,6 +191,8 @@ def explorer_page(
     axes = len(archive.meta.facts.behavior_names)
     if axes != 2:
         raise NichechainError(f"behavior has {axes} axes, but the page is a map over 2")
+    if not isinstance(archive.niches, GridNiches):
+        raise NichechainError(f"{archive.folder} has niches of a tessellation, but the page shows a grid")
     if chain.niches != archive.niches:
         raise NichechainError(f"the chain is not over the niches of {archive.folder}")
     if chain.states > _STATES:
@@ -214,6 +220,7 @@ def _text(name: str) -> str:
 
 def _facts(archive: Archive, chain: NicheChain) -> dict[str, Any]:
     facts, niches, counts = archive.meta.facts, archive.niches, archive.counts
+    assert isinstance(niches, GridNiches)
     return {
         "name": archive.folder.resolve().name,
         "domain": archive.config.domain,

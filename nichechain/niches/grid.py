@@ -1,9 +1,8 @@
-"""Niches: a grid over the behavior space, and the state outside it."""
+"""A grid over the behavior space."""
 
 from __future__ import annotations
 
 import operator
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,14 +10,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from nichechain.errors import NichechainError
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-
-Niche = int | tuple[int, ...]
-"""A niche is its flat id or its grid index (C order, axis 0 is x)."""
-
-OUTSIDE_MODES = ("state", "absorb", "clip")
+from nichechain.niches.base import (
+    Floats,
+    Ints,
+    Niche,
+    check_bounds,
+    check_outside,
+    checked_behavior,
+    is_inside,
+)
 
 # pyribs adds this to a scaled coordinate before it rounds down (its default ``epsilon``), and the
 # two must put a behavior in the same cell.
@@ -50,6 +50,8 @@ class GridNiches:
     bounds: tuple[tuple[float, float], ...]
     outside: str = "state"
 
+    kind = "grid"
+
     def __post_init__(self) -> None:
         object.__setattr__(self, "shape", tuple(int(k) for k in self.shape))
         object.__setattr__(self, "bounds", tuple((float(a), float(b)) for a, b in self.bounds))
@@ -59,13 +61,8 @@ class GridNiches:
             raise NichechainError(
                 f"grid has {len(self.shape)} axes but bounds have {len(self.bounds)}: one pair per axis"
             )
-        for low, high in self.bounds:
-            if not (np.isfinite(low) and np.isfinite(high) and low < high):
-                raise NichechainError(f"bounds are {low:g} to {high:g}, but must be finite and increasing")
-        if self.outside not in OUTSIDE_MODES:
-            raise NichechainError(
-                f"outside is {self.outside!r}, but must be one of {', '.join(OUTSIDE_MODES)}"
-            )
+        check_bounds(self.bounds)
+        check_outside(self.outside)
 
     def __len__(self) -> int:
         """Number of niches; the outside state is not one."""
@@ -111,18 +108,13 @@ class GridNiches:
         NichechainError
             If the shape does not fit or a value is not finite.
         """
-        points = np.asarray(behavior, np.float64)
-        if points.ndim != 2 or points.shape[1] != len(self.shape):
-            raise NichechainError(f"behavior has shape {points.shape}, but must be (N, {len(self.shape)})")
-        if not np.isfinite(points).all():
-            raise NichechainError("behavior has NaN or infinite values, which belong to no niche")
+        points = checked_behavior(behavior, len(self.shape))
         shape = np.array(self.shape)
         scaled = (shape * (points - self.lower) + _EPSILON) / (self.upper - self.lower)
         index = np.clip(scaled, 0, shape - 1).astype(np.int64)
         flat: Ints = np.ravel_multi_index(tuple(index.T), self.shape).astype(np.int64)
         if self.outside != "clip":
-            inside = ((points >= self.lower) & (points <= self.upper)).all(axis=1)
-            flat[~inside] = len(self)
+            flat[~is_inside(points, self.bounds)] = len(self)
         return flat
 
     def flat(self, niche: Niche) -> int:
@@ -158,6 +150,10 @@ class GridNiches:
         """Grid index of a niche given as flat id."""
         return tuple(int(k) for k in np.unravel_index(self.flat(flat), self.shape))
 
+    def settings(self) -> dict[str, Any]:
+        """What the configuration of a build says of these niches."""
+        return {"niches": self.kind, "shape": self.shape, "bounds": self.bounds, "outside": self.outside}
+
     def label(self, state: int) -> str:
         """``"7,11"`` for a niche, ``"outside"`` for the outside state."""
         return "outside" if state == len(self) else ",".join(map(str, self.index(state)))
@@ -166,61 +162,3 @@ class GridNiches:
         """Values of all niches (n,) laid out as the grid."""
         array: NDArray[Any] = np.asarray(values)
         return array.reshape(self.shape)
-
-
-def parse_shape(text: str) -> tuple[int, ...]:
-    """``"20x20"`` as ``(20, 20)``.
-
-    Raises
-    ------
-    NichechainError
-        If the text is no such thing.
-    """
-    try:
-        shape = tuple(int(part) for part in text.lower().split("x"))
-    except ValueError:
-        shape = ()
-    if not shape or min(shape) < 1:
-        raise NichechainError(
-            f"--grid is {text!r}, but must be cells per axis such as 20x20, each at least 1"
-        )
-    return shape
-
-
-def parse_bounds(text: str) -> tuple[tuple[float, float], ...]:
-    """``"1.05,1.55,0.4,1.1"`` as ``((1.05, 1.55), (0.4, 1.1))``.
-
-    Raises
-    ------
-    NichechainError
-        If the text is no such thing.
-    """
-    try:
-        values: Sequence[float] = [float(part) for part in text.split(",")]
-    except ValueError:
-        values = []
-    pairs = tuple(zip(values[::2], values[1::2], strict=False))
-    finite = all(np.isfinite(values))
-    if not values or len(values) % 2 or not finite or any(low >= high for low, high in pairs):
-        raise NichechainError(
-            f"--bounds is {text!r}, but must be X0,X1,Y0,Y1 with X0 < X1 and Y0 < Y1, "
-            "such as 1.05,1.55,0.4,1.1"
-        )
-    return pairs
-
-
-def parse_niche(text: str, option: str) -> tuple[int, ...] | int:
-    """``"7,11"`` as ``(7, 11)``, ``"151"`` as ``151``.
-
-    Raises
-    ------
-    NichechainError
-        If the text is no such thing.
-    """
-    try:
-        index = tuple(int(part) for part in text.split(","))
-    except ValueError:
-        raise NichechainError(
-            f"{option} is {text!r}, but must be a grid index such as 7,11 or a niche number such as 151"
-        ) from None
-    return index if len(index) > 1 else index[0]

@@ -1,0 +1,198 @@
+"""How far children land from their parents, pooled over all niches: one weight for each pair."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import fft, sparse
+from scipy.signal import fftconvolve
+
+from nichechain.alias import RowSampler
+from nichechain.niches import GridNiches
+
+if TYPE_CHECKING:
+    from nichechain.chain.counts import TransitionCounts
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+class Displacement(Protocol):
+    """Weights K_ij ≥ 0 of pairs of niches, K_ii > 0, that depend on their places alone.
+
+    Given that a child of niche i stays in bounds, it is in niche j with probability
+    K_ij / Σ_j K_ij. K is never kept as n × n numbers where there are many niches.
+    """
+
+    @property
+    def within(self) -> Floats:
+        """Σ_j K_ij for every niche, (n,)."""
+        ...
+
+    def at(self, parent: Ints, child: Ints) -> Floats:
+        """K_ij of some pairs of niches, (N,)."""
+        ...
+
+    def row(self, niche: int) -> Floats:
+        """K_ij of one parent, (n,)."""
+        ...
+
+    def to_parents(self, values: Floats) -> Floats:
+        """Σ_j K_ij x_j for each row x of values (c, n)."""
+        ...
+
+    def to_children(self, values: Floats) -> Floats:
+        """Σ_i x_i K_ij for each row x of values (c, n)."""
+        ...
+
+    def sample(self, parent: Ints, rng: np.random.Generator) -> Ints:
+        """A niche in bounds for a child of each parent (N,), which are niches."""
+        ...
+
+    def own(self, parent: Ints, child: Ints) -> tuple[Floats, Floats]:
+        """What one birth of each pair counts for, in births, (N,) each.
+
+        First in the weight of its pair; then in the weights of all children of its parent. Both
+        are 1 where no other niche is displaced from the parent in the same way.
+        """
+        ...
+
+    def without_parent(
+        self, counts: TransitionCounts, parent: Ints, child: Ints, share: Floats
+    ) -> tuple[Floats, Floats]:
+        """Weights of some pairs, and of all children, as births of other parents give them, (N,) each.
+
+        Parameters
+        ----------
+        counts : TransitionCounts
+            Those that the weights are made of.
+        parent, child : (N,) int64 arrays
+            Niches.
+        share : (N,) float64 array
+            K_ij / Σ_j K_ij of the pairs.
+        """
+        ...
+
+
+@dataclass(frozen=True)
+class GridDisplacement:
+    """On a grid: the share of births with each displacement, in cells.
+
+    Parameters
+    ----------
+    niches : GridNiches
+    kernel : float64 array of shape (2 k - 1, ...) for k cells along an axis
+        Share of each displacement among births inside of parents inside.
+    """
+
+    niches: GridNiches
+    kernel: Floats
+
+    @classmethod
+    def pooled(cls, niches: GridNiches, parent: Ints, child: Ints, count: Ints) -> GridDisplacement:
+        """Displacements of births from niche to niche."""
+        kernel = np.zeros(tuple(2 * k - 1 for k in niches.shape))
+        np.add.at(kernel, _cells_apart(niches, parent, child), count)
+        # Half a birth at no distance keeps the kernel usable from every niche.
+        kernel[tuple(k - 1 for k in niches.shape)] += 0.5
+        return cls(niches, kernel / kernel.sum())
+
+    @cached_property
+    def within(self) -> Floats:
+        """Share of the kernel that stays in the grid, for a parent in each niche, (n,)."""
+        # Correlation of the kernel with the grid's indicator.
+        flipped = np.flip(self.kernel)
+        stays = fftconvolve(flipped, np.ones(self.niches.shape), mode="valid")
+        within: Floats = np.maximum(stays.ravel(), self.kernel[tuple(k - 1 for k in self.niches.shape)])
+        return within
+
+    def at(self, parent: Ints, child: Ints) -> Floats:
+        """K_ij of some pairs of niches, (N,)."""
+        found: Floats = self.kernel[_cells_apart(self.niches, parent, child)]
+        return found
+
+    def row(self, niche: int) -> Floats:
+        """K_ij of one parent, (n,)."""
+        shape = self.niches.shape
+        start = np.unravel_index(niche, shape)
+        seen = tuple(slice(k - 1 - i, 2 * k - 1 - i) for i, k in zip(start, shape, strict=True))
+        found: Floats = self.kernel[seen].ravel()
+        return found
+
+    def to_parents(self, values: Floats) -> Floats:
+        """Σ_j K_ij x_j for each row x of values (c, n)."""
+        return self._moved(values, self._spectrum)
+
+    def to_children(self, values: Floats) -> Floats:
+        """Σ_i x_i K_ij for each row x of values (c, n)."""
+        return self._moved(values, self._spectrum.conj())
+
+    def sample(self, parent: Ints, rng: np.random.Generator) -> Ints:
+        """A niche in bounds for a child of each parent (N,), which are niches."""
+        child = np.empty(parent.size, np.int64)
+        shape = np.array(self.niches.shape)
+        open_ = np.arange(parent.size)
+        # Drawing again whatever lands off the grid conditions the kernel on staying in it.
+        while open_.size:
+            cells = np.stack(np.unravel_index(parent[open_], self.niches.shape), axis=1)
+            moves = self._moves.draw(np.zeros(open_.size, np.int64), rng)
+            step = np.stack(np.unravel_index(moves, self.kernel.shape), axis=1) - (shape - 1)
+            landed = cells + step
+            stays = ((landed >= 0) & (landed < shape)).all(axis=1)
+            child[open_[stays]] = np.ravel_multi_index(tuple(landed[stays].T), self.niches.shape)
+            open_ = open_[~stays]
+        return child
+
+    def own(self, parent: Ints, child: Ints) -> tuple[Floats, Floats]:  # noqa: ARG002
+        """Ones: of all niches, one alone is displaced from the parent like this."""
+        return np.ones(parent.size), np.ones(parent.size)
+
+    def without_parent(
+        self, counts: TransitionCounts, parent: Ints, child: Ints, share: Floats
+    ) -> tuple[Floats, Floats]:
+        """See :class:`Displacement`; weights are in births."""
+        n = len(self.niches)
+        kept = np.asarray(counts.matrix[:n, :n].sum(axis=1), np.float64).ravel()
+        # A row's own births inside are all among those that its kernel keeps in the grid.
+        within = self.within[parent] * (kept.sum() + 0.5)
+        count = np.asarray(counts.matrix[parent, child]).ravel().astype(np.float64)
+        return share * within - count, within - kept[parent]
+
+    @cached_property
+    def _moves(self) -> RowSampler:
+        return RowSampler(sparse.csr_array(self.kernel.reshape(1, -1)))
+
+    @property
+    def _padded(self) -> list[int]:
+        # No displacement within the grid wraps around a torus of this size onto another cell.
+        return [fft.next_fast_len(side, real=True) for side in self.kernel.shape]
+
+    @cached_property
+    def _spectrum(self) -> NDArray[np.complex128]:
+        """Transform of the kernel as a correlation takes it: backwards, no displacement first."""
+        torus = np.zeros(self._padded)
+        torus[tuple(slice(side) for side in self.kernel.shape)] = np.flip(self.kernel)
+        torus = np.roll(torus, [1 - k for k in self.niches.shape], axis=tuple(range(torus.ndim)))
+        transformed: NDArray[np.complex128] = fft.rfftn(torus)
+        return transformed
+
+    def _moved(self, values: Floats, spectrum: NDArray[np.complex128]) -> Floats:
+        """Each row of values (c, n) correlated or convolved with the kernel, on the grid."""
+        shape = self.niches.shape
+        axes = tuple(range(1, len(shape) + 1))
+        moved = fft.rfftn(values.reshape(-1, *shape), self._padded, axes=axes)
+        moved *= spectrum
+        whole = fft.irfftn(moved, self._padded, axes=axes, overwrite_x=True)
+        within: Floats = whole[(slice(None), *(slice(k) for k in shape))]
+        return within.reshape(len(values), -1)
+
+
+def _cells_apart(niches: GridNiches, parent: Ints, child: Ints) -> tuple[Ints, ...]:
+    """Index into the displacement kernel for each pair of niches."""
+    start = np.unravel_index(parent, niches.shape)
+    end = np.unravel_index(child, niches.shape)
+    return tuple((b - a + k - 1).astype(np.int64) for a, b, k in zip(start, end, niches.shape, strict=True))

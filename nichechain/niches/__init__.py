@@ -1,0 +1,25 @@
+"""Niches: a grid or a Voronoi tessellation of the behavior space, and the state outside it."""
+
+from __future__ import annotations
+
+from nichechain.niches.base import OUTSIDE_MODES, Niche, Niches
+from nichechain.niches.cvt import CVTNiches
+from nichechain.niches.grid import GridNiches
+from nichechain.niches.making import check, make
+from nichechain.niches.one_hot import one_hot
+from nichechain.niches.parsing import parse_bounds, parse_niche, parse_niches, parse_shape
+
+__all__ = [
+    "OUTSIDE_MODES",
+    "CVTNiches",
+    "GridNiches",
+    "Niche",
+    "Niches",
+    "check",
+    "make",
+    "one_hot",
+    "parse_bounds",
+    "parse_niche",
+    "parse_niches",
+    "parse_shape",
+]

@@ -1,0 +1,83 @@
+"""Niches as the command line writes them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from nichechain.errors import NichechainError
+
+
+def parse_shape(text: str) -> tuple[int, ...]:
+    """``"20x20"`` as ``(20, 20)``.
+
+    Raises
+    ------
+    NichechainError
+        If the text is no such thing.
+    """
+    try:
+        shape = tuple(int(part) for part in text.lower().split("x"))
+    except ValueError:
+        shape = ()
+    if not shape or min(shape) < 1:
+        raise NichechainError(
+            f"--grid is {text!r}, but must be cells per axis such as 20x20, each at least 1"
+        )
+    return shape
+
+
+def parse_bounds(text: str) -> tuple[tuple[float, float], ...]:
+    """``"1.05,1.55,0.4,1.1"`` as ``((1.05, 1.55), (0.4, 1.1))``.
+
+    Raises
+    ------
+    NichechainError
+        If the text is no such thing.
+    """
+    try:
+        values: Sequence[float] = [float(part) for part in text.split(",")]
+    except ValueError:
+        values = []
+    pairs = tuple(zip(values[::2], values[1::2], strict=False))
+    finite = all(np.isfinite(values))
+    if not values or len(values) % 2 or not finite or any(low >= high for low, high in pairs):
+        raise NichechainError(
+            f"--bounds is {text!r}, but must be X0,X1,Y0,Y1 with X0 < X1 and Y0 < Y1, "
+            "such as 1.05,1.55,0.4,1.1"
+        )
+    return pairs
+
+
+def parse_niche(text: str, option: str) -> tuple[int, ...] | int:
+    """``"7,11"`` as ``(7, 11)``, ``"151"`` as ``151``.
+
+    Raises
+    ------
+    NichechainError
+        If the text is no such thing.
+    """
+    try:
+        index = tuple(int(part) for part in text.split(","))
+    except ValueError:
+        raise NichechainError(
+            f"{option} is {text!r}, but must be a grid index such as 7,11 or a niche number such as 151"
+        ) from None
+    return index if len(index) > 1 else index[0]
+
+
+def parse_niches(text: str) -> int:
+    """``"cvt:400"`` as 400.
+
+    Raises
+    ------
+    NichechainError
+        If the text is no such thing.
+    """
+    kind, _, number = text.partition(":")
+    if kind != "cvt" or not number.isdecimal() or int(number) < 1:
+        raise NichechainError(
+            f"--niches is {text!r}, but must be cvt and a number of niches such as cvt:400; a grid is --grid"
+        )
+    return int(number)
