@@ -7,7 +7,7 @@ import sys
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from types import FrameType
+from types import FrameType, SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -95,6 +95,7 @@ def test_bytes_do_not_depend_on_extensions_with_many_parts(
     assert len([name for name in once if name.startswith("births/")]) == 12
     assert built(tmp_path / "often", 30, 250, 251, 777, 1000, 3000) == once
     monkeypatch.setattr(building, "CHECKPOINT_SECONDS", -1.0)
+    monkeypatch.setattr(building, "_COMMIT_SHARE", 1e9)
     assert built(tmp_path / "committed", 777, 3000, workers=2) == once
     elites = next(name for name in whole if name.startswith("elites"))
     assert once[elites] == whole[elites]
@@ -165,7 +166,7 @@ class Interrupted(RoughArm):
         return super().evaluate(genotypes)
 
 
-@pytest.mark.parametrize("error", [RuntimeError("broken"), KeyboardInterrupt()], ids=["error", "interrupt"])
+@pytest.mark.parametrize("error", [MemoryError("broken"), KeyboardInterrupt()], ids=["error", "interrupt"])
 @pytest.mark.parametrize("call", [0, 3, 10, 25, 60])
 def test_resumes_after_the_domain_raised(
     error: BaseException, call: int, short: dict[str, bytes], tmp_path: Path
@@ -229,6 +230,7 @@ def interrupt_at(line: int, folder: Path, config: BuildConfig, function: str | N
 def check_interrupts(lines: range, folder: Path, monkeypatch: pytest.MonkeyPatch) -> int:
     """Interrupt at some lines, go on, and compare; how many of the lines there were."""
     monkeypatch.setattr(building, "CHECKPOINT_SECONDS", -1.0)
+    monkeypatch.setattr(building, "_COMMIT_SHARE", 1e9)
     monkeypatch.setattr(store, "PART_ROWS", 40)
     config = replace(SHORT, evaluations=146)
     expected = built(folder / "whole", config=config)
@@ -352,3 +354,32 @@ def test_domain_is_made_from_its_name(tmp_path: Path) -> None:
         build(config, tmp_path / "named", executor)
         build(config, str(tmp_path / "given"), executor, domain=PlanarArm())
     assert content(tmp_path / "named") == content(tmp_path / "given")
+
+
+def test_commits_take_no_more_than_a_hundredth_of_the_time(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where one takes 5 s and a batch 1 s, the second comes 500 s after the first."""
+    now = 0.0
+    commits = []
+    commit = store.Writer.commit
+
+    class Clocked(Threads):
+        def evaluate(
+            self, domain: Domain, genotypes: NDArray[np.float32], on_done: Callable[[int], None] | None = None
+        ) -> Evaluation:
+            nonlocal now
+            now += 1.0
+            return super().evaluate(domain, genotypes, on_done)
+
+    def slowly(writer: store.Writer, state: illumination.SearchState) -> None:
+        nonlocal now
+        commits.append(now)
+        now += 5.0
+        commit(writer, state)
+
+    monkeypatch.setattr(building, "time", SimpleNamespace(monotonic=lambda: now))
+    monkeypatch.setattr(store.Writer, "commit", slowly)
+    with Clocked(1) as executor:
+        build(replace(SHORT, evaluations=600, initial=1, batch=1), tmp_path, executor)
+    assert commits == [31.0, 31.0 + 5.0 + 501.0, 610.0]

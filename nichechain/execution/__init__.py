@@ -5,12 +5,21 @@ from __future__ import annotations
 from contextlib import AbstractContextManager
 
 from nichechain.errors import NichechainError
-from nichechain.execution.base import Executor, available_cpus
+from nichechain.execution.base import WORKER_DIED, Executor, available_cpus, evaluate_rows
 from nichechain.execution.processes import Processes
 from nichechain.execution.ray import Ray
 from nichechain.execution.threads import Threads
 
-__all__ = ["Executor", "Processes", "Ray", "Threads", "available_cpus", "make"]
+__all__ = [
+    "WORKER_DIED",
+    "Executor",
+    "Processes",
+    "Ray",
+    "Threads",
+    "available_cpus",
+    "evaluate_rows",
+    "make",
+]
 
 
 def make(workers: str | None = None) -> AbstractContextManager[Executor]:

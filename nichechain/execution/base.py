@@ -1,9 +1,11 @@
-"""What an executor is, and what every one of them says of a genotype whose evaluation raises."""
+"""What an executor is, and what every one of them makes of a genotype whose evaluation goes wrong."""
 
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Protocol
 
 import numpy as np
@@ -11,6 +13,11 @@ from numpy.typing import NDArray
 
 from nichechain.domains.base import Domain, Evaluation
 from nichechain.errors import NichechainError
+
+WORKER_DIED = "worker died"
+"""Why a row failed that no worker outlives."""
+
+_LONGEST_REASON = 500
 
 
 class Executor(Protocol):
@@ -22,7 +29,7 @@ class Executor(Protocol):
         genotypes: NDArray[np.float32],
         on_done: Callable[[int], None] | None = None,
     ) -> Evaluation:
-        """The rows of ``domain.evaluate(genotypes)``, in order, to the bit.
+        """The rows of ``evaluate_rows(domain, genotypes)``, in order, to the bit.
 
         Parameters
         ----------
@@ -34,31 +41,96 @@ class Executor(Protocol):
 
         Raises
         ------
-        Exception
-            What the domain raises; a note names the row of the genotype.
+        NichechainError
+            If the domain raises it, or does not return what a domain must.
+        MemoryError
+            If the domain runs out of memory, for that is not the genotype's doing.
         """
         ...
 
 
-def evaluate_rows(domain: Domain, genotypes: NDArray[np.float32], first: int) -> Evaluation:
-    """Evaluate some rows of a batch, from row ``first`` on; an exception gets a note of its row."""
+def evaluate_rows(domain: Domain, genotypes: NDArray[np.float32]) -> Evaluation:
+    """Evaluate genotypes here; one for which the domain raises has failed, and only that one.
+
+    Parameters
+    ----------
+    domain : Domain
+    genotypes : (N, P) float32 array
+        N at least 1.
+
+    Returns
+    -------
+    Evaluation
+        A row also failed if its behavior or objective is not finite.
+
+    Raises
+    ------
+    NichechainError
+        If the domain raises it, or does not return what a domain must.
+    MemoryError
+        If the domain runs out of memory, for that is not the genotype's doing.
+    """
     try:
-        return domain.evaluate(genotypes)
-    except Exception as error:
-        error.add_note(f"raised by {domain!r} for {_culprit(domain, genotypes, first)}")
+        evaluation = domain.evaluate(genotypes)
+    except (MemoryError, NichechainError):
         raise
+    except Exception as error:
+        if len(genotypes) == 1:
+            return all_failed(domain, 1, reason_of(error))
+        # Domains are pure, so the row that raised among others raises alone, and the others do not.
+        half = len(genotypes) // 2
+        return Evaluation.concatenate(
+            [evaluate_rows(domain, genotypes[:half]), evaluate_rows(domain, genotypes[half:])]
+        )
+    return _checked(domain, evaluation, len(genotypes))
 
 
-def _culprit(domain: Domain, genotypes: NDArray[np.float32], first: int) -> str:
-    if len(genotypes) > 1:
-        # Domains are pure, so the row that raised among others raises alone.
-        for row in range(len(genotypes)):
-            try:
-                domain.evaluate(genotypes[row : row + 1])
-            except Exception:
-                return f"row {first + row} of the batch"
-        return f"rows {first} to {first + len(genotypes) - 1} of the batch"
-    return f"row {first} of the batch"
+def all_failed(domain: Domain, rows: int, reason: str) -> Evaluation:
+    """Rows none of which has a behavior, for one reason."""
+    behavior = np.full((rows, len(domain.behavior_names)), np.nan)
+    return Evaluation(behavior, np.full(rows, np.nan), np.ones(rows, bool), (reason,) * rows)
+
+
+def reason_of(error: BaseException) -> str:
+    """Type and message of an exception on one line, the same wherever it was raised."""
+    try:
+        message = str(error)
+    except Exception:
+        message = ""
+    # Where an object happened to lie differs from one process to the next.
+    message = re.sub(r"\b0x[0-9a-fA-F]+", "0x...", " ".join(message.split()))
+    name = type(error).__name__
+    return _storable(f"{name}: {message}" if message else name)
+
+
+def _storable(reason: str) -> str:
+    return reason.encode("utf-8", "backslashreplace")[:_LONGEST_REASON].decode("utf-8", "ignore")
+
+
+def _checked(domain: Domain, evaluation: Evaluation, rows: int) -> Evaluation:
+    behavior, objective, failed = evaluation.behavior, evaluation.objective, evaluation.failed
+    expected = (rows, len(domain.behavior_names))
+    lengths = (len(objective), len(failed), len(evaluation.reasons))
+    if behavior.shape != expected or lengths != (rows,) * 3:
+        raise NichechainError(
+            f"{domain!r} gave behaviors of shape {behavior.shape} and {lengths[0]} objectives, {lengths[1]} "
+            f"flags and {lengths[2]} reasons, but must give shape {expected} and {rows} of each"
+        )
+    odd = ~failed & ~(np.isfinite(behavior).all(axis=1) & np.isfinite(objective))
+    reasons = tuple(
+        "behavior or objective is not finite" if bad else _storable(reason) if reason else ""
+        for bad, reason in zip(odd, evaluation.reasons, strict=True)
+    )
+    if not odd.any() and reasons == evaluation.reasons:
+        return evaluation
+    return replace(
+        evaluation,
+        behavior=np.where(odd[:, None], np.nan, behavior),
+        objective=np.where(odd, np.nan, objective),
+        failed=failed | odd,
+        reasons=reasons,
+        spread=None if evaluation.spread is None else np.where(odd[:, None], np.nan, evaluation.spread),
+    )
 
 
 def available_cpus() -> int:

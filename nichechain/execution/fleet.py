@@ -18,11 +18,14 @@ from numpy.typing import NDArray
 
 from nichechain.domains.base import Domain, Evaluation
 from nichechain.errors import NichechainError
-from nichechain.execution.base import evaluate_rows
+from nichechain.execution.base import WORKER_DIED, all_failed, evaluate_rows
 from nichechain.execution.pieces import LOSSES, Piece, Pieces
 
 _AHEAD = 2
 """Pieces with a worker at a time: one under way, and the next, so that it never waits for us."""
+
+_HOPELESS = 8
+"""Rows that workers died of before any row came back, after which the domain is the cause."""
 
 _PATIENCE = 300.0
 """Seconds without any worker, after which none is expected any more."""
@@ -79,14 +82,14 @@ class Workbench:
             return Raised.of(error)
         return None
 
-    def evaluate(self, genotypes: NDArray[np.float32], first: int) -> Evaluation | Raised:
-        """Rows of a batch from row ``first`` on, or what one of them raised."""
+    def evaluate(self, genotypes: NDArray[np.float32]) -> Evaluation | Raised:
+        """Rows of a batch, or what went so wrong that it is not for a row to bear."""
         if self._domain is None and (raised := self.prepare()) is not None:
             return raised
         assert self._domain is not None
         try:
             # A copy, for Ray's arrays are read-only, which a domain need not expect.
-            return evaluate_rows(self._domain, genotypes.copy(), first)
+            return evaluate_rows(self._domain, genotypes.copy())
         except Exception as error:
             return Raised.of(error)
 
@@ -103,8 +106,8 @@ class Worker(ABC):
     ready: Future[Outcome]
 
     @abstractmethod
-    def submit(self, genotypes: NDArray[np.float32], first: int) -> Future[Outcome]:
-        """Send rows of a batch, from row ``first`` on."""
+    def submit(self, genotypes: NDArray[np.float32]) -> Future[Outcome]:
+        """Send rows of a batch."""
 
     @abstractmethod
     def stop(self, *, kill: bool) -> None:
@@ -114,7 +117,8 @@ class Worker(ABC):
 class Fleet(ABC):
     """An executor whose workers may be lost; their rows are evaluated elsewhere.
 
-    A lost worker is replaced. The domain travels to each worker once.
+    A lost worker is replaced. A row that costs one worker after another has failed, and its reason
+    is ``WORKER_DIED``. The domain travels to each worker once.
     """
 
     _lost: tuple[type[BaseException], ...]
@@ -123,6 +127,7 @@ class Fleet(ABC):
     def __init__(self) -> None:
         self._crew: list[Worker] = []
         self._domain: Domain | None = None
+        self._proven = False
 
     @abstractmethod
     def _size(self) -> int:
@@ -147,7 +152,7 @@ class Fleet(ABC):
         Raises
         ------
         NichechainError
-            If the same rows cost several workers, or no worker can be had.
+            If no worker can be had, or workers die of every row, so that it is the domain's doing.
         """
         try:
             if domain is not self._domain:
@@ -156,9 +161,10 @@ class Fleet(ABC):
                 self._dismiss(kill=False)
                 self._send(cloudpickle.dumps(domain))
                 self._domain = domain
+                self._proven = False
             size = self._size()
             pieces = Pieces(len(genotypes), domain.chunk, size)
-            _Shift(self, pieces, genotypes, on_done).work(size)
+            _Shift(self, domain, pieces, genotypes, on_done).work(size)
         except BaseException:
             # What is still out is of no use to anybody, and an interrupt must not wait for it.
             self._dismiss(kill=True)
@@ -192,17 +198,20 @@ class _Shift:
     def __init__(
         self,
         fleet: Fleet,
+        domain: Domain,
         pieces: Pieces,
         genotypes: NDArray[np.float32],
         on_done: Callable[[int], None] | None,
     ) -> None:
         self._fleet = fleet
+        self._domain = domain
         self._pieces = pieces
         self._genotypes = genotypes
         self._on_done = on_done
         self._held: dict[Worker, deque[Piece]] = {}
         self._news: SimpleQueue[tuple[Worker, Piece | None, Future[Outcome]]] = SimpleQueue()
         self._false_starts = 0
+        self._given_up = 0
 
     def work(self, size: int) -> None:
         """Until no row is left."""
@@ -232,10 +241,14 @@ class _Shift:
             else:
                 assert outcome is not None
                 self._held[worker].remove(piece)
-                self._pieces.finish(piece, outcome)
-                if self._on_done is not None:
-                    self._on_done(len(piece))
+                self._fleet._proven = True
+                self._finish(piece, outcome)
             self._supply(worker)
+
+    def _finish(self, piece: Piece, outcome: Evaluation) -> None:
+        self._pieces.finish(piece, outcome)
+        if self._on_done is not None:
+            self._on_done(len(piece))
 
     def _watch(self, worker: Worker, piece: Piece | None, future: Future[Outcome]) -> None:
         future.add_done_callback(lambda done: self._news.put((worker, piece, done)))
@@ -249,7 +262,7 @@ class _Shift:
         held = self._held[worker]
         while len(held) < _AHEAD and (piece := self._pieces.take()) is not None:
             held.append(piece)
-            future = worker.submit(self._genotypes[piece.start : piece.stop], piece.start)
+            future = worker.submit(self._genotypes[piece.start : piece.stop])
             self._watch(worker, piece, future)
 
     def _replace(self, worker: Worker, error: BaseException) -> None:
@@ -263,9 +276,21 @@ class _Shift:
                 raise NichechainError(f"{LOSSES} workers in a row died as they started: {error}") from error
         elif held:
             # It worked in order, so it was at the first; the others only waited.
-            self._pieces.lose(held.popleft())
+            culprit = held.popleft()
+            if not self._pieces.lose(culprit):
+                self._give_up(culprit)
             for piece in held:
                 self._pieces.put_back(piece)
         self._hire()
         for other in self._held:
             self._supply(other)
+
+    def _give_up(self, piece: Piece) -> None:
+        """Record a row as failed that no worker outlives."""
+        self._given_up += 1
+        if self._given_up == _HOPELESS and not self._fleet._proven:
+            raise NichechainError(
+                f"evaluating each of {_HOPELESS} rows has cost {LOSSES} workers, and none has come back: "
+                "the domain crashes, or memory ran out"
+            )
+        self._finish(piece, all_failed(self._domain, len(piece), WORKER_DIED))

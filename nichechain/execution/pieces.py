@@ -7,10 +7,9 @@ from collections import deque
 from dataclasses import dataclass, replace
 
 from nichechain.domains.base import Evaluation
-from nichechain.errors import NichechainError
 
 LOSSES = 3
-"""Workers that may be lost over the same rows before we take the rows for the cause."""
+"""Workers that are lost over a row before we take the row for the cause."""
 
 _SHARES = 4
 _LARGEST = 16
@@ -75,29 +74,25 @@ class Pieces:
         """Have a piece evaluated elsewhere whose turn had not come when its worker was lost."""
         self._returned.append(piece)
 
-    def lose(self, piece: Piece) -> None:
+    def lose(self, piece: Piece) -> bool:
         """Have a piece evaluated elsewhere that a worker was at when it was lost.
 
-        It comes back in chunks, so that the one that kills, if one does, is soon alone.
+        It comes back in chunks, then in rows, so that the one that kills, if one does, is alone.
 
-        Raises
-        ------
-        NichechainError
-            If the same rows have cost ``LOSSES`` workers. They are not recorded as failed births:
-            that would make what is built depend on where it was built.
+        Returns
+        -------
+        bool
+            False if it is one row that has cost ``LOSSES`` workers: that row kills whoever
+            evaluates it, and does not come back.
         """
         losses = piece.losses + 1
-        if losses == LOSSES:
-            rows = (
-                f"row {piece.start}" if len(piece) == 1 else f"one of rows {piece.start} to {piece.stop - 1}"
-            )
-            raise NichechainError(
-                f"evaluating {rows} of the batch has cost {losses} workers, which died or were killed: "
-                "the domain crashes on it, or memory ran out"
-            )
-        for start in range(piece.start, piece.stop, self._chunk):
-            stop = min(start + self._chunk, piece.stop)
+        if losses >= LOSSES and len(piece) == 1:
+            return False
+        size = self._chunk if losses == 1 else 1
+        for start in range(piece.start, piece.stop, size):
+            stop = min(start + size, piece.stop)
             self._returned.append(replace(piece, start=start, stop=stop, losses=losses))
+        return True
 
     def evaluation(self) -> Evaluation:
         """The rows of the whole batch, in order, once none is left."""

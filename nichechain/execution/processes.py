@@ -65,9 +65,9 @@ class _Process(Worker):
         self._pool: Any = ProcessPoolExecutor(1, initializer=_begin, initargs=(domain, os.getpid()), env=env)
         self.ready = self._pool.submit(_prepare)
 
-    def submit(self, genotypes: NDArray[np.float32], first: int) -> Future[Outcome]:
+    def submit(self, genotypes: NDArray[np.float32]) -> Future[Outcome]:
         try:
-            future: Future[Outcome] = self._pool.submit(_evaluate, genotypes, first)
+            future: Future[Outcome] = self._pool.submit(_evaluate, genotypes)
         except BrokenProcessPool as error:
             future = Future()
             future.set_exception(error)
@@ -99,5 +99,5 @@ def _prepare() -> Raised | None:
     return _bench[0].prepare()
 
 
-def _evaluate(genotypes: NDArray[np.float32], first: int) -> Evaluation | Raised:
-    return _bench[0].evaluate(genotypes, first)
+def _evaluate(genotypes: NDArray[np.float32]) -> Evaluation | Raised:
+    return _bench[0].evaluate(genotypes)

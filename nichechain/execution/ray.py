@@ -71,8 +71,8 @@ class _Actor(Worker):
         self._handle = handle
         self.ready = handle.prepare.remote().future()
 
-    def submit(self, genotypes: NDArray[np.float32], first: int) -> Future[Outcome]:
-        future: Future[Outcome] = self._handle.evaluate.remote(genotypes, first).future()
+    def submit(self, genotypes: NDArray[np.float32]) -> Future[Outcome]:
+        future: Future[Outcome] = self._handle.evaluate.remote(genotypes).future()
         return future
 
     def stop(self, *, kill: bool) -> None:  # noqa: ARG002  # an idle actor has nothing to leave behind

@@ -41,7 +41,7 @@ class Threads:
         """Evaluate genotypes (N, P), N at least 1, telling ``on_done`` of every finished chunk's size."""
         # Chunks are views, so a long queue of them costs next to nothing.
         futures = [
-            self._pool.submit(evaluate_rows, domain, genotypes[first : first + domain.chunk], first)
+            self._pool.submit(evaluate_rows, domain, genotypes[first : first + domain.chunk])
             for first in range(0, len(genotypes), domain.chunk)
         ]
         try:

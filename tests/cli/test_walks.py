@@ -38,7 +38,7 @@ def test_pressure_leaves_tables_tests_figure_and_report(pressure):
     command = next(line for line in report.splitlines() if line.startswith("nichechain walks"))
     assert command == (
         "nichechain walks pressure arm --runs 3 --steps 4 --levels selective,0.5,random "
-        f"--offspring 6 --out {pressure}"
+        f"--offspring 6 --bounds -1.0,1.0,-1.0,1.0 --out {pressure}"
     )
 
 

@@ -85,14 +85,15 @@ class Awkward(Exception):  # noqa: N818
 class Raises(Arm):
     """Raises at the genotype numbered 17."""
 
-    def __init__(self, awkward: bool = False, chunk: int = 5) -> None:
+    def __init__(self, awkward: bool = False, chunk: int = 5, error: Exception | None = None) -> None:
         super().__init__()
         self.awkward = awkward
         self.chunk = chunk
+        self.error = error or ArithmeticError("elbow")
 
     def evaluate(self, genotypes: ArrayLike) -> Evaluation:
         if (np.asarray(genotypes)[:, 0] == 17).any():
-            raise Awkward("hinge", "elbow") if self.awkward else ArithmeticError("elbow")
+            raise Awkward("hinge", "elbow") if self.awkward else self.error
         return super().evaluate(genotypes)
 
 

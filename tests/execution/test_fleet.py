@@ -25,8 +25,16 @@ class FakeFleet(Fleet):
 
     _lost = (Lost,)
 
-    def __init__(self, size: int, mortality: float = 0.0, seed: int = 0, ready: bool = True) -> None:
+    def __init__(
+        self,
+        size: int,
+        mortality: float = 0.0,
+        seed: int = 0,
+        ready: bool = True,
+        deadly: tuple[int, ...] = (),
+    ) -> None:
         super().__init__()
+        self.deadly = deadly
         self.size, self.mortality, self.is_ready = size, mortality, ready
         self.dice = random.Random(seed)
         self.hired = self.deaths = self.most_out = 0
@@ -53,20 +61,21 @@ class FakeWorker(Worker):
         self.dead = False
         self.ready: Future[Outcome] = self.pool.submit(self.bench.prepare) if fleet.is_ready else Future()
 
-    def submit(self, genotypes: np.ndarray, first: int) -> Future[Outcome]:
+    def submit(self, genotypes: np.ndarray) -> Future[Outcome]:
         with self.lock:
             self.out += 1
             self.fleet.most_out = max(self.fleet.most_out, self.out)
-        return self.pool.submit(self.work, genotypes, first)
+        return self.pool.submit(self.work, genotypes)
 
-    def work(self, genotypes: np.ndarray, first: int) -> Outcome:
-        if self.dead or self.fleet.dice.random() < self.fleet.mortality:
+    def work(self, genotypes: np.ndarray) -> Outcome:
+        deadly = np.isin(genotypes[:, 0], self.fleet.deadly).any()
+        if self.dead or deadly or self.fleet.dice.random() < self.fleet.mortality:
             self.fleet.deaths += not self.dead
             self.dead = True
             raise Lost
         with self.lock:
             self.out -= 1
-        return self.bench.evaluate(genotypes, first)
+        return self.bench.evaluate(genotypes)
 
     def stop(self, *, kill: bool) -> None:
         self.pool.shutdown(wait=not kill)
@@ -93,6 +102,35 @@ def test_lost_workers_change_nothing(seed: int, monkeypatch: pytest.MonkeyPatch)
         assert executor.hired == 3 + executor.deaths
         assert len(executor._crew) == 3
     assert sum(done) == 400
+
+
+@pytest.mark.parametrize("size", [1, 2, 5])
+@pytest.mark.parametrize("deadly", [(0,), (17,), (3, 4, 250), (255,), tuple(range(100, 130))])
+def test_rows_that_nobody_outlives_have_failed_and_no_others(size: int, deadly: tuple[int, ...]) -> None:
+    rows = numbered(256)
+    alive = ~np.isin(np.arange(256), deadly)
+    done: list[int] = []
+    with FakeFleet(size, deadly=deadly) as executor:
+        found = executor.evaluate(Arm(), rows, done.append)
+        # Each of the dead was replaced.
+        assert executor.hired == size + executor.deaths
+    expected = Arm().evaluate(rows)
+    assert found.failed.tolist() == (~alive).tolist()
+    assert found.reasons == tuple("" if fine else "worker died" for fine in alive)
+    assert found.behavior[alive].tobytes() == expected.behavior[alive].tobytes()
+    assert np.isnan(found.behavior[~alive]).all()
+    assert np.isnan(found.objective[~alive]).all()
+    assert sum(done) == 256
+    # A row costs three workers at least, and those beside it one each at most while it is found.
+    assert executor.deaths >= 3 * min(len(deadly), 1)
+
+
+def test_a_domain_that_nobody_outlives_is_the_cause() -> None:
+    with (
+        FakeFleet(2, mortality=1.0) as executor,
+        pytest.raises(NichechainError, match="each of 8 rows has cost 3 workers, and none has come back"),
+    ):
+        executor.evaluate(Arm(), numbered(256))
 
 
 def test_few_pieces_are_out_at_a_time() -> None:

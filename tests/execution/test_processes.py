@@ -17,7 +17,7 @@ from nichechain.building import build
 from nichechain.config import BuildConfig
 from nichechain.domains import FetchPickAndPlace
 from nichechain.errors import NichechainError
-from nichechain.execution import Executor, Processes, Threads
+from nichechain.execution import Executor, Processes, Threads, evaluate_rows
 from nichechain.walks import Selective, WalkConfig, walk
 
 from .samples import (
@@ -125,10 +125,14 @@ def test_a_process_killed_while_idle_loses_nothing(two: Processes, tmp_path: Pat
     assert_same(two.evaluate(domain, numbered(100)), Arm().evaluate(numbered(100)))
 
 
-def test_a_genotype_that_kills_every_process_is_named(two: Processes) -> None:
-    # Handed out in chunks of 5, so that is as close as it gets.
-    with pytest.raises(NichechainError, match="one of rows 15 to 19 of the batch has cost 3 workers"):
-        two.evaluate(Deadly(), numbered(40))
+def test_a_genotype_that_kills_every_process_has_failed(two: Processes) -> None:
+    expected = Arm().evaluate(numbered(40))
+    found = two.evaluate(Deadly(), numbered(40))
+    assert np.flatnonzero(found.failed).tolist() == [17]
+    assert found.reasons[17] == "worker died"
+    assert np.isnan(found.behavior[17]).all()
+    fine = ~found.failed
+    assert found.behavior[fine].tobytes() == expected.behavior[fine].tobytes()
     assert_same(two.evaluate(Arm(), numbered(9)), Arm().evaluate(numbered(9)))
 
 
@@ -142,23 +146,36 @@ def test_a_domain_that_cannot_be_unpacked(two: Processes) -> None:
         two.evaluate(Fragile(), numbered(4))
 
 
-@pytest.mark.parametrize("kind", ["threads", "processes"])
+@pytest.mark.parametrize("kind", ["here", "threads", "processes"])
 @pytest.mark.parametrize("chunk", [1, 5, 4096])
-def test_an_exception_names_the_row(kind: str, chunk: int, two: Processes) -> None:
+@pytest.mark.parametrize("awkward", [False, True])
+def test_a_genotype_for_which_the_domain_raises_has_failed(
+    kind: str, chunk: int, awkward: bool, two: Processes
+) -> None:
+    domain, rows = Raises(chunk=chunk, awkward=awkward), numbered(60)
+    with Threads(2) as threads:
+        executors: dict[str, Executor] = {"threads": threads, "processes": two}
+        found = executors[kind].evaluate(domain, rows) if kind in executors else evaluate_rows(domain, rows)
+    expected = Arm().evaluate(rows)
+    reason = "Awkward: hinge in elbow" if awkward else "ArithmeticError: elbow"
+    assert found.reasons == ("",) * 17 + (reason,) + ("",) * 42
+    assert found.failed.tolist() == [bool(reason) for reason in found.reasons]
+    fine = ~found.failed
+    assert found.behavior[fine].tobytes() == expected.behavior[fine].tobytes()
+    assert found.objective[fine].tobytes() == expected.objective[fine].tobytes()
+    assert np.isnan(found.behavior[17]).all()
+    assert np.isnan(found.objective[17])
+
+
+@pytest.mark.parametrize("kind", ["threads", "processes"])
+@pytest.mark.parametrize("error", [MemoryError("no more"), NichechainError("no such block")], ids=repr)
+def test_what_no_genotype_can_help_comes_through(kind: str, error: Exception, two: Processes) -> None:
     with Threads(2) as threads:
         executor: Executor = threads if kind == "threads" else two
-        with pytest.raises(ArithmeticError) as caught:
-            executor.evaluate(Raises(chunk=chunk), numbered(60))
-    assert str(caught.value) == "elbow"
-    assert "for row 17 of the batch" in notes(caught.value)
-
-
-def test_an_exception_that_cannot_travel_sends_its_words(two: Processes) -> None:
-    with pytest.raises(RuntimeError) as caught:
-        two.evaluate(Raises(awkward=True), numbered(60))
-    assert str(caught.value) == "Awkward: hinge in elbow"
-    assert "for row 17 of the batch" in notes(caught.value)
-    assert "in evaluate" in notes(caught.value)
+        with pytest.raises(type(error), match=str(error)) as caught:
+            executor.evaluate(Raises(error=error), numbered(60))
+    if kind == "processes":
+        assert "in evaluate" in notes(caught.value)
 
 
 @pytest.mark.parametrize(

@@ -12,10 +12,9 @@ import pytest
 
 from nichechain import execution
 from nichechain.domains import FetchPickAndPlace
-from nichechain.errors import NichechainError
 from nichechain.execution import Ray, Threads
 
-from .samples import Arm, Deadly, Raises, Writes, assert_same, check_nothing_is_left, notes, numbered
+from .samples import Arm, Deadly, Raises, Writes, assert_same, check_nothing_is_left, numbered
 from .test_processes import built
 
 ray = pytest.importorskip("ray")
@@ -63,15 +62,16 @@ def test_a_lost_actor_loses_nothing(cluster: Ray, tmp_path: Path) -> None:
     assert_same(cluster.evaluate(domain, numbered(100), done.append), Arm().evaluate(numbered(100)))
     assert (tmp_path / "died").exists()
     assert sum(done) == 100
-    with pytest.raises(NichechainError, match="one of rows 15 to 19 of the batch has cost 3 workers"):
-        cluster.evaluate(Deadly(), numbered(40))
+    found = cluster.evaluate(Deadly(), numbered(40))
+    assert np.flatnonzero(found.failed).tolist() == [17]
+    assert found.reasons[17] == "worker died"
 
 
-def test_an_exception_names_the_row(cluster: Ray) -> None:
-    with pytest.raises(ArithmeticError) as caught:
-        cluster.evaluate(Raises(), numbered(60))
-    assert str(caught.value) == "elbow"
-    assert "for row 17 of the batch" in notes(caught.value)
+def test_a_genotype_for_which_the_domain_raises_has_failed(cluster: Ray) -> None:
+    found = cluster.evaluate(Raises(), numbered(60))
+    with Threads(2) as threads:
+        assert_same(found, threads.evaluate(Raises(), numbered(60)))
+    assert found.reasons[17] == "ArithmeticError: elbow"
     rows = numbered(30)
     assert_same(cluster.evaluate(Writes(), rows), Writes().evaluate(rows.copy()))
 

@@ -89,7 +89,7 @@ def test_rows_come_in_order_even_if_the_first_is_last() -> None:
     np.testing.assert_array_equal(evaluation.behavior, PlanarArm().evaluate(numbered(10)).behavior)
 
 
-@pytest.mark.parametrize("error", [RuntimeError("broken"), KeyboardInterrupt()])
+@pytest.mark.parametrize("error", [MemoryError("broken"), NichechainError("broken"), KeyboardInterrupt()])
 def test_an_error_comes_through_and_stops_the_rest(error: BaseException) -> None:
     domain = Breaks(error)
     with Threads(1) as executor:
@@ -104,9 +104,9 @@ def test_an_error_comes_through_and_stops_the_rest(error: BaseException) -> None
 
 def test_an_executor_can_go_on_after_an_error() -> None:
     with Threads(2) as executor:
-        domain = Breaks(RuntimeError("broken"))
+        domain = Breaks(MemoryError("broken"))
         domain.release.set()
-        with pytest.raises(RuntimeError, match="broken"):
+        with pytest.raises(MemoryError, match="broken"):
             executor.evaluate(domain, numbered(10))
         assert len(executor.evaluate(SmallChunks(), numbered(10))) == 10
 
