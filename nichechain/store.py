@@ -22,7 +22,8 @@ from __future__ import annotations
 
 import io
 import json
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -88,6 +89,8 @@ class Writer:
         self._full: list[dict[str, Any]] = []
         self._final = 0
         self._tail = births.schema(len(config.bounds)).empty_table()
+        self._new: list[pa.Table] = []
+        self._waiting = 0
         if is_archive(folder):
             meta = read_meta(folder)
             self._committed = meta.births
@@ -103,11 +106,22 @@ class Writer:
     @property
     def births(self) -> int:
         """Rows committed or appended."""
-        return self._final + len(self._tail)
+        return self._final + len(self._tail) + self._waiting
 
     def append(self, rows: pa.Table) -> None:
-        """Births for the next commit."""
-        self._tail = pa.concat_tables([self._tail, rows])
+        """Births for the next commit.
+
+        Raises
+        ------
+        ArchiveError
+            As :meth:`commit`: so many of them are written at once that memory stays flat.
+        """
+        # One by one they would be copied again and again.
+        self._new.append(rows)
+        self._waiting += len(rows)
+        if len(self._tail) + self._waiting >= PART_ROWS:
+            with self._explained():
+                self._write_full_parts()
 
     def commit(self, state: SearchState) -> None:
         """Make the state and the births so far durable; before it returns, the last commit holds.
@@ -118,22 +132,33 @@ class Writer:
             If the folder cannot be written to. The last commit is then whole, and another attempt
             may be made.
         """
-        try:
+        with self._explained():
             self._commit(state)
+        self._committed = state.births
+
+    @contextmanager
+    def _explained(self) -> Iterator[None]:
+        try:
+            yield
         except OSError as error:
             raise ArchiveError(
                 f"{error.filename or self._folder} cannot be written: {error.strerror or error}; "
                 f"the last commit, of {self._committed} births, is whole: --resume goes on from there"
             ) from error
-        self._committed = state.births
 
-    def _commit(self, state: SearchState) -> None:
+    def _write_full_parts(self) -> None:
+        """Write what no later birth can change; it counts once a commit names it."""
         (self._folder / BIRTHS).mkdir(parents=True, exist_ok=True)
+        # In one statement each, so that an interrupt leaves every birth in one place.
+        self._tail, self._new, self._waiting = pa.concat_tables([self._tail, *self._new]), [], 0
         while len(self._tail) >= PART_ROWS:
             part = self._write_part(self._tail[:PART_ROWS])
+            rest = self._tail[PART_ROWS:].combine_chunks()
             self._full.append(part)
-            self._tail = self._tail[PART_ROWS:].combine_chunks()
-            self._final += PART_ROWS
+            self._tail, self._final = rest, self._final + PART_ROWS
+
+    def _commit(self, state: SearchState) -> None:
+        self._write_full_parts()
         parts = [*self._full, self._write_part(self._tail)] if len(self._tail) else self._full
         arrays = {name: getattr(state.elites, name) for name in Elites.__dataclass_fields__}
         arrays |= {f"pending_{name}": getattr(state.pending, name) for name in Offspring.__dataclass_fields__}

@@ -149,7 +149,8 @@ def test_a_failure_at_every_operation_of_a_commit(
             break
         seen |= {operation.split()[0] for operation in disk.operations}
         archive = load(folder)
-        assert archive.meta.births in (450, 700)
+        # What fails once may be tried again when the build ends, with the births there are by then.
+        assert archive.meta.births in ((450, 612, 700) if kind == "broken once" else (450, 700))
         assert len(archive.births()) == archive.meta.births
         assert built(folder, LATER) == expected
         shutil.rmtree(folder)
