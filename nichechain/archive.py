@@ -19,6 +19,7 @@ from nichechain.domains.base import Domain
 from nichechain.errors import ArchiveError, NichechainError
 from nichechain.illumination import Elites
 from nichechain.niches import Niche, Niches
+from nichechain.notebook import facts_table
 from nichechain.trust import check_trusted
 
 if TYPE_CHECKING:
@@ -83,6 +84,19 @@ class Archive:
             f"Archive({str(self.folder)!r}: {self.filled} of {len(self.niches)} niches filled "
             f"by {self.meta.births} births)"
         )
+
+    def _repr_html_(self) -> str:
+        counts = self.counts
+        facts = {
+            "folder": self.folder,
+            "domain": f"{self.config.domain}, behavior {', '.join(self.meta.facts.behavior_names)}",
+            "niches filled": f"{self.filled} of {len(self.niches)}",
+            "births": f"{self.meta.births}, {counts.births_outside} of them outside",
+            "rows of T observed": f"{counts.rows_observed} of {len(self.niches)}",
+            "mutation": f"{self.config.mutation}, scale {self.config.scale:g}",
+            "seed": self.config.seed,
+        }
+        return facts_table("Archive", facts)
 
     @property
     def filled(self) -> int:

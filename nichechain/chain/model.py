@@ -12,6 +12,7 @@ from scipy import sparse
 from nichechain.chain.operator import PooledTransition
 from nichechain.errors import NichechainError
 from nichechain.niches import Niche, Niches
+from nichechain.notebook import facts_table
 
 if TYPE_CHECKING:
     import networkx as nx
@@ -80,6 +81,17 @@ class NicheChain:
     def __repr__(self) -> str:
         place = "" if self.outside is None else " and outside"
         return f"NicheChain({self.n_niches} niches{place}, estimator: {self.estimator})"
+
+    def _repr_html_(self) -> str:
+        facts: dict[str, object] = {
+            "niches": self.n_niches,
+            "outside": "none" if self.outside is None else f"state {self.outside}",
+            "T": self.estimator,
+        }
+        if self.counts is not None:
+            births = int(self.counts.births.sum())
+            facts |= {"births with a parent": births, "rows observed": self.counts.rows_observed}
+        return facts_table("NicheChain", facts)
 
     @cached_property
     def T(self) -> Matrix:  # noqa: N802  # the paper's name

@@ -9,7 +9,7 @@ import sys
 from collections.abc import Sequence
 
 COMMANDS = {
-    "domains": "what can be searched, with bounds, genotype length and speed",
+    "domains": "what can be searched, with bounds and genotype lengths",
     "build": "fill an archive: MAP-Elites that records who was born where",
     "info": "what is in an archive, and what made it",
     "evolvability": "l-evolvability of niches, or of an elite",
@@ -24,6 +24,7 @@ COMMANDS = {
     "explore": "a page on which one clicks a niche and sees where its descendants go",
     "sweep": "how many niches the births of an archive fill: too few, too many, and a suggestion",
     "validate": "whether the chain is one, and whether its predictions come true",
+    "completion": "a script with which a shell completes commands and options",
 }
 
 
@@ -95,8 +96,8 @@ def _help() -> str:
         "commands:",
         *(f"  {name:<{width}}  {text}" for name, text in COMMANDS.items()),
         "",
-        "nichechain COMMAND --help tells a command's options; --version tells the version;",
-        "--debug shows where an error comes from.",
+        "nichechain COMMAND --help tells a command's options; --json writes tables as JSON;",
+        "--version tells the version; --debug shows where an error comes from.",
         "",
         "try:",
         "  nichechain build fetch",

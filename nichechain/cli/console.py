@@ -6,6 +6,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import fields
 from typing import TYPE_CHECKING, Any, TypeVar
 
 if TYPE_CHECKING:
@@ -40,6 +41,10 @@ def parse(
     import tyro
 
     name = name or command.__name__.lower()
+    if "--json" in arguments and any(f.name == "format" for f in fields(command)):  # type: ignore[arg-type]
+        # The one spelling that every command with a table knows.
+        place = list(arguments).index("--json")
+        arguments = [*arguments[:place], "--format", "json", *arguments[place + 1 :]]
     given = {} if default is None else {"default": default}
     read: Command = tyro.cli(command, prog=f"nichechain {name}", args=list(arguments), **given)  # type: ignore[call-overload]
     return read
