@@ -30,6 +30,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from nichechain.domains.base import Evaluation
+from nichechain.errors import NichechainError
 
 NONE = -1
 """Stands for a null uid or niche in the arrays of this package."""
@@ -78,6 +79,19 @@ def schema(axes: int) -> pa.Schema:
             ("step", pa.int32()),
         ]
     )
+
+
+def check_columns(births: pa.Table, *names: str) -> None:
+    """Refuse a table that lacks some of these columns.
+
+    Raises
+    ------
+    NichechainError
+        If it does.
+    """
+    missing = [name for name in names if name not in births.column_names]
+    if missing:
+        raise NichechainError(f"births have no column {missing[0]}, but need {', '.join(names)}")
 
 
 def table(

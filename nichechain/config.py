@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from dataclasses import MISSING, asdict, dataclass, field, fields
 from typing import Any, Literal, TypeAlias, get_args
 
+from nichechain.arguments import as_bounds, as_shape, check_numbers
 from nichechain.errors import NichechainError
 
 Replacement = Literal["random", "first", "newest", "objective"]
@@ -108,15 +109,24 @@ class BuildConfig:
                 raise NichechainError(
                     f"{name} is {getattr(self, name)!r}, but must be a whole number"
                 ) from None
-        object.__setattr__(self, "shape", tuple(int(cells) for cells in self.shape))
-        object.__setattr__(self, "bounds", tuple((float(low), float(high)) for low, high in self.bounds))
+        object.__setattr__(self, "shape", as_shape(self.shape))
+        object.__setattr__(self, "bounds", as_bounds(self.bounds))
+        check_numbers(scale=self.scale)
         object.__setattr__(self, "scale", float(self.scale))
         object.__setattr__(self, "domain_options", plain_options(self.domain_options))
+        for scale in self.layer_scales:
+            check_numbers(layer_scale=scale)
         object.__setattr__(self, "layer_scales", tuple(float(scale) for scale in self.layer_scales))
         if self.df is not None:
+            check_numbers(df=self.df)
             object.__setattr__(self, "df", float(self.df))
         if self.step_bound is not None:
+            if isinstance(self.step_bound, str) or len(self.step_bound) != 2:
+                raise NichechainError(
+                    f"step_bound is {self.step_bound!r}, but must be a kind and a size, as ('rescaled', 2.0)"
+                )
             kind, size = self.step_bound
+            check_numbers(step_bound=size)
             object.__setattr__(self, "step_bound", (kind, float(size)))
         for name in ("evaluations", "initial", "batch"):
             if getattr(self, name) < 1:

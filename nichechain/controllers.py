@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from nichechain.arguments import as_floats, check_sample, check_whole, rng_of
 from nichechain.errors import NichechainError
 
 if TYPE_CHECKING:
@@ -119,6 +120,8 @@ class MLP:
     evolve_biases: bool = False
 
     def __post_init__(self) -> None:
+        for size in self.sizes:
+            check_whole(layer_size=size)
         if len(self.sizes) < 2 or min(self.sizes) < 1:
             raise NichechainError(f"layer sizes are {self.sizes}, but two or more positive ones are needed")
         if not isinstance(self.hidden, str) and len(self.hidden) != len(self.sizes) - 2:
@@ -199,7 +202,7 @@ class MLP:
         NichechainError
             If the genotype has the wrong length.
         """
-        flat = np.ascontiguousarray(genotype, np.float32)
+        flat = np.ascontiguousarray(as_floats("genotype", genotype), np.float32)
         if flat.shape != (self.genotype_length,):
             raise NichechainError(
                 f"genotype has shape {flat.shape}, but this controller's has ({self.genotype_length},)"
@@ -232,7 +235,7 @@ class MLP:
         a row's bits depend on neither the batch nor the machine, and the native engine has the
         same. The torch module of :meth:`module` sums in another order: equal up to rounding.
         """
-        units = np.asarray(observations, np.float32)
+        units = as_floats("observations", observations).astype(np.float32)
         if units.ndim != 2 or units.shape[1] != self.sizes[0]:
             raise NichechainError(f"observations have shape {units.shape}, but must be (N, {self.sizes[0]})")
         flat = self.parameters(genotype)
@@ -268,7 +271,8 @@ class MLP:
         """
         import torch
 
-        generator = torch.Generator().manual_seed(int(np.random.default_rng(seed).integers(2**63)))
+        check_sample(n)
+        generator = torch.Generator().manual_seed(int(rng_of(seed).integers(2**63)))
         genotypes = np.empty((n, self.genotype_length), np.float32)
         for row in genotypes:
             start = 0
@@ -344,7 +348,8 @@ class ModuleController:
         """
         import torch
 
-        generator = torch.Generator().manual_seed(int(np.random.default_rng(seed).integers(2**63)))
+        check_sample(n)
+        generator = torch.Generator().manual_seed(int(rng_of(seed).integers(2**63)))
         genotypes = np.zeros((n, self.genotype_length), np.float32)
         for row in genotypes:
             start = 0

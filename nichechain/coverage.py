@@ -11,6 +11,7 @@ from scipy import sparse
 from scipy.special import gammaln
 
 from nichechain.alias import RowSampler
+from nichechain.arguments import as_whole, check_whole
 from nichechain.errors import NichechainError
 
 Floats = NDArray[np.float64]
@@ -78,7 +79,7 @@ def expected_coverage(
     E = Σ_j 1 − (1 − h_j)^U, where h_j is the probability that one lineage
     visits niche j.
     """
-    sizes = np.atleast_1d(np.asarray(lineages))
+    sizes = _sizes(lineages)
     check_lengths(generations, sizes.min())
     coverage = np.zeros((first.shape[0], sizes.size))
     for _, visited in visit_probabilities(transition, first, generations, counted, columns):
@@ -108,7 +109,10 @@ def visit_probabilities(
     each other, so a block of them at a time bounds the memory.
     """
     states = transition.shape[0]
-    niches = states if counted is None else counted
+    niches = _counted(counted, states)
+    check_whole(columns=columns)
+    if columns < 1:
+        raise NichechainError(f"columns is {columns}, but must be at least 1")
     transition = _faster(transition)
     for start in range(0, niches, columns):
         targets = np.arange(start, min(start + columns, niches))
@@ -149,8 +153,12 @@ def coverage_by_generation(
     With first rows out of T itself, T · H_{g−1} is at once the answer for g generations and, its
     diagonal set to 1, the H_g of the next: all lengths cost no more than the longest.
     """
-    states = np.asarray(roots, np.int64)
-    sizes = np.asarray(lineages, np.int64)
+    states = as_whole("roots", roots)
+    size = transition.shape[0]
+    if states.ndim != 1 or ((states < 0) | (states >= size)).any():
+        raise NichechainError(f"roots are {states.tolist()}, but must be states from 0 to {size - 1}")
+    counted = _counted(counted, size)
+    sizes = _sizes(lineages)
     check_lengths(generations, sizes.min())
     transition = _faster(transition)
     found = np.zeros((states.size, generations, sizes.size))
@@ -204,10 +212,11 @@ def sampled_coverage(
         If a number is below 1, or T has too many entries to walk by.
     """
     check_lengths(generations, lineages)
+    check_whole(repeats=repeats)
     if repeats < 1:
         raise NichechainError(f"repeats is {repeats}, but at least 1 is needed")
     states = transition.shape[0]
-    niches = states if counted is None else counted
+    niches = _counted(counted, states)
     step = RowSampler(entries(transition))
     start = RowSampler(sparse.csr_array(first[None, :]))
     at_once = max(1, _SIMULATION_CELLS // max(states, lineages))
@@ -267,11 +276,14 @@ def rarefied_coverage(counts: ArrayLike, size: int, *, counted: int | None = Non
     -----
     E = Σ_j 1 − C(m − c_j, U) / C(m, U); Hurlbert (1971), "The nonconcept of species diversity".
     """
-    observed = np.asarray(counts, np.int64)
+    check_whole(size=size)
+    observed = as_whole("counts", counts)
+    if observed.ndim != 1 or (observed < 0).any():
+        raise NichechainError("counts must be one number per state, none of them negative")
     total = int(observed.sum())
     if not 1 <= size <= total:
         raise NichechainError(f"size is {size}, but must be between 1 and the {total} offspring observed")
-    niches = observed[:counted]
+    niches = observed[: _counted(counted, observed.size)]
     others = total - niches[niches > 0]
     possible = others[others >= size].astype(np.float64)
     log_missed = (
@@ -282,13 +294,31 @@ def rarefied_coverage(counts: ArrayLike, size: int, *, counted: int | None = Non
 
 def check_lengths(generations: int, lineages: int) -> None:
     """Refuse a lineage without generations, none at all, and parts of one."""
-    for name, number in (("l", generations), ("lineages", lineages)):
-        if not isinstance(number, (int, np.integer)):
-            raise NichechainError(f"{name} is {number}, but must be a whole number")
+    check_whole(l=generations, lineages=lineages)
     if generations < 1:
         raise NichechainError(f"l is {generations}, but a lineage has at least 1 generation")
     if lineages < 1:
         raise NichechainError(f"lineages is {lineages}, but at least 1 is needed")
+
+
+def _sizes(lineages: ArrayLike) -> Ints:
+    """Numbers of lineages, (k,); a single one must be whole by its type, as l must."""
+    if np.ndim(lineages) == 0:
+        check_whole(lineages=lineages)
+    sizes = np.atleast_1d(as_whole("lineages", lineages))
+    if sizes.ndim != 1 or not sizes.size:
+        raise NichechainError(f"lineages has shape {sizes.shape}, but must be one or more numbers")
+    return sizes
+
+
+def _counted(counted: int | None, states: int) -> int:
+    """How many of the first states are niches that count."""
+    if counted is None:
+        return states
+    check_whole(counted=counted)
+    if not 0 <= counted <= states:
+        raise NichechainError(f"counted is {counted}, but must be from 0 to the number of states, {states}")
+    return counted
 
 
 def _faster(transition: LinearMap) -> LinearMap:

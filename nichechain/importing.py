@@ -109,7 +109,10 @@ def import_births(
         If the folder holds an archive.
     """
     columns, axes = columns or Columns(), axes or Axes()
-    content = Path(log).read_bytes()
+    try:
+        content = Path(log).read_bytes()
+    except OSError as error:
+        raise NichechainError(f"{log} cannot be read: {error.strerror}") from error
     table = _read(Path(log), content)
     missing = [name for name in columns.names if name not in table.column_names]
     if missing:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from nichechain.arguments import check_numbers
 from nichechain.errors import NichechainError
 
 Floats = NDArray[np.float64]
@@ -41,6 +42,7 @@ class PolynomialMutation:
     eta: float = 45.0
 
     def __post_init__(self) -> None:
+        check_numbers(low=self.low, high=self.high, eta=self.eta)
         if not (math.isfinite(self.low) and math.isfinite(self.high) and self.low < self.high):
             raise NichechainError(f"genes are from {self.low} to {self.high}, but must have finite bounds")
         if not (math.isfinite(self.eta) and self.eta >= 0):

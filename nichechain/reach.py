@@ -10,6 +10,7 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
+from nichechain.arguments import check_whole
 from nichechain.chain.draws import Root, generations, transition_draws
 from nichechain.chain.model import NicheChain, Transition
 from nichechain.chain.operator import PooledTransition
@@ -212,5 +213,6 @@ def check_draws(convention: str, draws: int) -> None:
         raise NichechainError(
             f"convention is {convention!r}, but must be one of {', '.join(get_args(Convention))}"
         )
+    check_whole(draws=draws)
     if draws < 1:
         raise NichechainError(f"draws is {draws}, but at least 1 is needed")

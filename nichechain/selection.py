@@ -113,6 +113,9 @@ def curiosity(births: pd.DataFrame, by: Literal["elite", "niche"] = "elite") -> 
     keys = {"elite": ["run", "parent_uid", "parent_niche"], "niche": ["parent_niche"]}
     if by not in keys:
         raise NichechainError(f"by is {by!r}, but must be elite or niche")
+    missing = [name for name in (*keys[by], "accepted", "parent_uid") if name not in births]
+    if missing:
+        raise NichechainError(f"births have no column {missing[0]}, but need it for curiosity scores")
     children = births[births["parent_niche"].notna()]
     for name, meaning in (("accepted", "which children entered the archive"), ("parent_uid", "who had them")):
         if children[name].isna().any() and (name == "accepted" or by == "elite"):

@@ -16,9 +16,11 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from nichechain.arguments import as_floats, check_whole
 from nichechain.births import NONE
 from nichechain.chain import NicheChain, TransitionCounts, estimate
 from nichechain.chain.comparison import counts_of_families, families_of, probability_of
+from nichechain.coverage import check_lengths
 from nichechain.errors import NichechainError
 from nichechain.evolvability import l_evolvability
 from nichechain.niches import GridNiches
@@ -213,6 +215,13 @@ def sweep(
         sizes = default_sizes(axes)
     if not sizes:
         raise NichechainError("there are no sizes: give at least one, such as 20")
+    check_lengths(l, lineages)
+    check_whole(min_births=min_births, draws=draws, folds=folds)
+    if folds < 2:
+        raise NichechainError(f"folds is {folds}, but at least 2 are needed")
+    for size in sizes:
+        if not isinstance(size, Sequence):
+            check_whole(size=size)
     shapes = {(size,) * axes if isinstance(size, (int, np.integer)) else tuple(size) for size in sizes}
     grids = [GridNiches(shape, archive.niches.bounds, archive.niches.outside) for shape in shapes]
     grids.sort(key=lambda grid: (len(grid), grid.shape))
@@ -220,7 +229,7 @@ def sweep(
     if behavior is None:
         place = _most_fertile(archive, parents, elite)
     else:
-        place = np.asarray(behavior, np.float64)
+        place = as_floats("behavior", behavior)
         if place.shape != (axes,):
             raise NichechainError(f"behavior has {place.size} numbers, but these births have {axes} axes")
         if not ((place >= archive.niches.lower) & (place <= archive.niches.upper)).all():

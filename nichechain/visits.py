@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
 from nichechain.alias import RowSampler
+from nichechain.arguments import as_floats, check_whole
 from nichechain.chain.draws import Root, generations, transition_draws
 from nichechain.chain.model import NicheChain, Transition
 from nichechain.coverage import check_lengths, entries
@@ -115,6 +116,7 @@ def visit_metrics(
     """
     check_lengths(l, lineages)
     check_draws(convention, draws)
+    check_whole(repeats=repeats)
     if repeats < 1:
         raise NichechainError(f"repeats is {repeats}, but at least 1 is needed")
     root = Root(chain, niche=niche, offspring=offspring)
@@ -163,7 +165,7 @@ def uniformity(visits: ArrayLike, *, occupied: bool = False) -> Floats:
     -----
     The distance is the square root of the divergence (Lin 1991; Endres and Schindelin 2003).
     """
-    shares = _shares(np.asarray(visits, np.float64))
+    shares = _shares(_visits(visits))
     even = np.ones_like(shares)
     if occupied:
         even = (shares > 0).astype(np.float64)
@@ -177,7 +179,18 @@ def uniformity(visits: ArrayLike, *, occupied: bool = False) -> Floats:
 
 def visit_entropy(visits: ArrayLike) -> Floats:
     """Entropy of visits (..., n) over niches, in bits; NaN without visits."""
-    return _bits(_shares(np.asarray(visits, np.float64)))
+    return _bits(_shares(_visits(visits)))
+
+
+def _visits(visits: ArrayLike) -> Floats:
+    numbers = as_floats("visits", visits)
+    if not numbers.ndim or not numbers.shape[-1]:
+        raise NichechainError(
+            f"visits has shape {numbers.shape}, but must be (..., n) with a number per niche"
+        )
+    if not np.isfinite(numbers).all() or (numbers < 0).any():
+        raise NichechainError("visits has values that are negative or not finite, but counts visits")
+    return numbers
 
 
 def _shares(visits: Floats) -> Floats:

@@ -62,7 +62,7 @@ class Root:
             raise NichechainError("give either a niche or the distribution of the offspring, and only one")
         self.state = None if niche is None else chain.state(niche)
         self._distribution = np.zeros(chain.states)
-        if self.state is None:
+        if offspring is not None:
             self._distribution = _distribution(offspring, chain)
         else:
             self._distribution[self.state] = 1.0

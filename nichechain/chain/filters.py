@@ -6,7 +6,6 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from nichechain.arguments import check_whole
 from nichechain.births import NONE, check_columns
 from nichechain.chain.counts import TransitionCounts
 from nichechain.errors import NichechainError
@@ -51,10 +50,9 @@ def counts_of(
     if run is not None:
         births = births.filter(pc.equal(births["run"], _run(births, run)))
     if steps is not None:
-        if not isinstance(steps, tuple) or len(steps) != 2:
+        if len(steps) != 2 or not all(isinstance(step, (int, np.integer)) for step in steps):
             raise NichechainError(f"steps are {steps!r}, but must be a window such as (0, 100)")
         first, end = steps
-        check_whole(first_step=first, end_of_steps=end)
         if not 0 <= first < end:
             raise NichechainError(f"steps are {first} to {end}, but must be a window such as (0, 100)")
         step = _said(births, "step", "their step")

@@ -188,7 +188,7 @@ def _states(chain: NicheChain, target: Target) -> Ints:
         several = list(target)
     else:
         # A tuple is the index of one niche; what is no niche at all is for the chain to refuse.
-        several = [target]  # type: ignore[list-item]
+        several = [target]
     if not several:
         raise NichechainError("the target is empty, but must have at least one niche")
     return np.unique([_state(chain, niche) for niche in several])

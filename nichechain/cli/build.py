@@ -132,7 +132,9 @@ class Build:
             bounds = parse_bounds(self.bounds)
         config = BuildConfig(
             domain=self.domain,
-            shape=parse_shape(self.grid or _GRID) if self.niches is None else (parse_niches(self.niches),),
+            shape=parse_shape(_GRID if self.grid is None else self.grid)
+            if self.niches is None
+            else (parse_niches(self.niches),),
             niches="grid" if self.niches is None else "cvt",
             niches_seed=self.niches_seed,
             bounds=bounds,

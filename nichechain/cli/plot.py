@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from nichechain.archive import Archive
 
 FORMATS = (".png", ".svg", ".pdf")
+_WITH_THRESHOLD = ("reachability", "classes", "transitions-by-class")
 
 # Figures of two pictures, and their sizes in inches.
 _PAIRS = {"uncertainty": (14.0, 7.4), "growth": (12.0, 5.6)}
@@ -79,6 +80,10 @@ def run(arguments: Sequence[str]) -> int:
         raise NichechainError(f"--out is {str(out)!r}, but there is no folder {out.parent}")
     if not 10 <= command.dpi <= 2000:
         raise NichechainError(f"--dpi is {command.dpi}, but must be between 10 and 2000")
+    if command.min_births < 0:
+        raise NichechainError(f"--min-births is {command.min_births}, but must not be negative")
+    if command.threshold is not None and command.kind not in _WITH_THRESHOLD:
+        raise NichechainError(f"--threshold belongs to {', '.join(_WITH_THRESHOLD)}, not to {command.kind}")
     from nichechain.archive import load
 
     if command.kind == "reach" and command.niche is None:

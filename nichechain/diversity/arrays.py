@@ -10,9 +10,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
+
+from nichechain.arguments import as_floats, as_whole
+from nichechain.errors import NichechainError
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
 
 # A block of pairwise values this large (16 MiB) still fits a processor's outer cache.
 _BLOCK = 2**21
@@ -52,3 +56,37 @@ def pair_blocks(walks: int, queries: int, others: int) -> Iterator[tuple[slice, 
 def pool_of(siblings: Floats, archive: Floats) -> Floats:
     """S ∪ X: siblings (R, N, B), then the archive (R, M, B)."""
     return np.concatenate([siblings, archive], axis=1)
+
+
+def checked_points(query: ArrayLike, pool: ArrayLike) -> tuple[Floats, Floats]:
+    """Behaviors to score (R, Q, B), and the pool (R, M, B) that they are scored against.
+
+    Raises
+    ------
+    NichechainError
+        If the shapes do not fit together.
+    """
+    points, others = as_floats("query", query), as_floats("pool", pool)
+    if points.ndim != 3 or others.ndim != 3 or points.shape[::2] != others.shape[::2]:
+        raise NichechainError(
+            f"query and pool have shapes {points.shape} and {others.shape}, "
+            "but must be (R, Q, B) and (R, M, B)"
+        )
+    return points, others
+
+
+def checked_own(itself: ArrayLike | None, points: Floats, others: Floats) -> Ints:
+    """Which point of the pool each query is, (Q,), -1 if none.
+
+    Raises
+    ------
+    NichechainError
+        If that is not one number per query, or no point of the pool.
+    """
+    queries, size = points.shape[1], others.shape[1]
+    own = np.full(queries, -1) if itself is None else as_whole("itself", itself)
+    if own.shape != (queries,) or ((own < -1) | (own >= size)).any():
+        raise NichechainError(
+            f"itself is {own.tolist()}, but must be {queries} numbers from -1 to {size - 1}, one per query"
+        )
+    return own

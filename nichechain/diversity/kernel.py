@@ -9,7 +9,16 @@ from typing import TYPE_CHECKING, Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from nichechain.diversity.arrays import ordered_sum, pair_blocks, pool_of, present, squared_distances
+from nichechain.arguments import as_floats, check_numbers
+from nichechain.diversity.arrays import (
+    checked_own,
+    checked_points,
+    ordered_sum,
+    pair_blocks,
+    pool_of,
+    present,
+    squared_distances,
+)
 from nichechain.errors import NichechainError
 
 if TYPE_CHECKING:
@@ -55,11 +64,15 @@ class KernelDensity:
     def __post_init__(self) -> None:
         if self.mode not in get_args(Mode):
             raise NichechainError(f"mode is {self.mode!r}, but must be one of {', '.join(get_args(Mode))}")
+        check_numbers(decay=self.decay)
         if not 0 < self.decay <= 1:
             raise NichechainError(f"decay is {self.decay}, but must be above 0 and at most 1")
         if self.mode == "matrix":
-            _check_matrix(np.asarray(self.bandwidth, np.float64))
-        elif np.ndim(self.bandwidth) != 0 or not 0 < float(self.bandwidth) < math.inf:  # type: ignore[arg-type]
+            _check_matrix(as_floats("bandwidth matrix", self.bandwidth))
+            return
+        if not isinstance(self.bandwidth, tuple):
+            check_numbers(bandwidth=self.bandwidth)
+        if isinstance(self.bandwidth, tuple) or not 0 < float(self.bandwidth) < math.inf:
             raise NichechainError(f"bandwidth is {self.bandwidth}, but must be a positive number")
 
     @property
@@ -135,10 +148,12 @@ def kernel_density(
     -----
     Source: Eq. 20 and 21 of the paper, without the minus sign.
     """
-    points, others = np.asarray(query, np.float64), np.asarray(pool, np.float64)
-    kernel = _kernel(np.asarray(matrix, np.float64), points.shape[2])
-    factor = np.ones(others.shape[:2]) if weight is None else np.asarray(weight, np.float64)
-    own = np.full(points.shape[1], -1) if itself is None else np.asarray(itself, np.int64)
+    points, others = checked_points(query, pool)
+    kernel = _kernel(as_floats("bandwidth matrix", matrix), points.shape[2])
+    factor = np.ones(others.shape[:2]) if weight is None else as_floats("weight", weight)
+    if factor.shape != others.shape[:2]:
+        raise NichechainError(f"weight has shape {factor.shape}, but must be {others.shape[:2]}, as the pool")
+    own = checked_own(itself, points, others)
     return _density(points, others, kernel, factor, own)
 
 
@@ -186,7 +201,7 @@ def _proportional(pool: Floats, factor: float, span: Floats) -> _Kernel:
 
 def _kernel(matrix: Floats, axes: int) -> _Kernel:
     """Kernel with bandwidth matrix (B, B), or kernels with (R, B, B)."""
-    if matrix.shape[-2:] != (axes, axes):
+    if matrix.ndim < 2 or matrix.shape[-2:] != (axes, axes):
         raise NichechainError(
             f"bandwidth matrix has shape {matrix.shape[-2:]}, but behavior needs {(axes, axes)}"
         )

@@ -13,7 +13,16 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from nichechain.diversity.arrays import ordered_sum, pair_blocks, pool_of, present, squared_distances
+from nichechain.arguments import as_floats, as_whole, check_whole
+from nichechain.diversity.arrays import (
+    checked_own,
+    checked_points,
+    ordered_sum,
+    pair_blocks,
+    pool_of,
+    present,
+    squared_distances,
+)
 from nichechain.errors import NichechainError
 
 Floats = NDArray[np.float64]
@@ -175,9 +184,9 @@ def knn_distance(query: ArrayLike, pool: ArrayLike, k: int, *, itself: ArrayLike
     with one k-d tree per walk.
     """
     _check_neighbours(k)
-    points, others = np.asarray(query, np.float64), np.asarray(pool, np.float64)
+    points, others = checked_points(query, pool)
     walks, queries, _ = points.shape
-    own = np.full(queries, -1) if itself is None else np.asarray(itself, np.int64)
+    own = checked_own(itself, points, others)
     score = np.empty((walks, queries))
     if queries >= _TREE_FROM_QUERIES:
         for walk in range(walks):
@@ -191,7 +200,12 @@ def knn_distance(query: ArrayLike, pool: ArrayLike, k: int, *, itself: ArrayLike
 
 def parent_distance(query: ArrayLike, parent: ArrayLike) -> Floats:
     """Distances between behaviors (R, Q, B) and their parents' (R, Q, B), as (R, Q)."""
-    difference = np.asarray(query, np.float64) - np.asarray(parent, np.float64)
+    points, before = as_floats("query", query), as_floats("parent", parent)
+    if not points.ndim or points.shape != before.shape:
+        raise NichechainError(
+            f"query and parent have shapes {points.shape} and {before.shape}, but must be alike, (R, Q, B)"
+        )
+    difference = points - before
     return np.sqrt(ordered_sum(difference * difference))
 
 
@@ -214,8 +228,17 @@ def ancestor_distance(query: ArrayLike, path: ArrayLike, lineage: ArrayLike) -> 
     -----
     Source: Eq. 19 of the paper.
     """
-    points, ancestors = np.asarray(query, np.float64), np.asarray(path, np.float64)
-    own = np.asarray(lineage, np.int64)
+    points, ancestors = as_floats("query", query), as_floats("path", path)
+    if points.ndim != 3 or ancestors.ndim != 4 or points.shape[::2] != ancestors.shape[::3]:
+        raise NichechainError(
+            f"query and path have shapes {points.shape} and {ancestors.shape}, "
+            "but must be (R, Q, B) and (R, μ, L, B)"
+        )
+    own = as_whole("lineage", lineage)
+    if own.shape != points.shape[1:2] or ((own < 0) | (own >= ancestors.shape[1])).any():
+        raise NichechainError(
+            f"lineage is {own.tolist()}, but must be one number per query, from 0 to {ancestors.shape[1] - 1}"
+        )
     score = np.empty(points.shape[:2])
     for state in range(ancestors.shape[1]):
         mine = np.flatnonzero(own == state)
@@ -255,5 +278,6 @@ def _by_tree(points: Floats, others: Floats, k: int, own: Ints) -> Floats:
 
 
 def _check_neighbours(k: int) -> None:
+    check_whole(k=k)
     if k < 1:
         raise NichechainError(f"k is {k}, but a behavior needs at least 1 neighbour")

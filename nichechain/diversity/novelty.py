@@ -8,6 +8,7 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from nichechain.arguments import check_numbers, check_whole
 from nichechain.errors import NichechainError
 
 Floats = NDArray[np.float64]
@@ -55,6 +56,11 @@ class ArchiveRule:
     scope: Scope = "walk"
 
     def __post_init__(self) -> None:
+        check_whole(limit=self.limit)
+        if self.probability is not None:
+            check_numbers(probability=self.probability)
+        if self.count is not None:
+            check_whole(count=self.count)
         if self.limit < 1:
             raise NichechainError(f"archive limit is {self.limit}, but must be at least 1")
         if self.probability is not None and not 0 < self.probability <= 1:

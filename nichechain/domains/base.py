@@ -137,7 +137,12 @@ def check_genotypes(genotypes: ArrayLike, length: int) -> Float32s:
     NichechainError
         If the shape does not fit.
     """
-    array = np.ascontiguousarray(genotypes, np.float32)
+    try:
+        array = np.ascontiguousarray(genotypes, np.float32)
+    except (TypeError, ValueError):
+        raise NichechainError(
+            "genotypes have values that are no numbers, or rows of unequal length"
+        ) from None
     if array.ndim != 2 or array.shape[1] != length:
         raise NichechainError(f"genotypes have shape {array.shape}, but must be (N, {length})")
     return array

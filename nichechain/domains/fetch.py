@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from nichechain.arguments import check_seed
 from nichechain.controllers import Controller
 from nichechain.domains.base import Evaluation, check_genotypes
 from nichechain.domains.networks import network
@@ -63,6 +64,7 @@ class FetchTask:
     def __init__(
         self, seed: int = 0, *, controller: nn.Module | str = "mlp:32,32", evolve_biases: bool = False
     ) -> None:
+        check_seed(seed)
         self.seed = int(seed)
         self.network: Controller = network(controller, self.inputs, _OUTPUTS, evolve_biases=evolve_biases)
         self._episodes_made: FetchEpisodes | None = None

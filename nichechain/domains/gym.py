@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from nichechain.arguments import as_bounds, check_seed, check_whole
 from nichechain.controllers import MLP, Controller
 from nichechain.domains.base import Evaluation, check_genotypes
 from nichechain.domains.descriptors import Descriptor, Episode, FinalObservation, MeanObservation, named
@@ -18,6 +19,7 @@ from nichechain.domains.noise import Noise, average, check_repeats, check_seeds,
 from nichechain.domains.spaces import Actions, Observations, actions_of
 from nichechain.errors import NichechainError
 from nichechain.niches import parse_bounds
+from nichechain.niches.base import check_bounds
 
 if TYPE_CHECKING:
     from torch import nn
@@ -105,6 +107,10 @@ class GymDomain:
         evolve_biases: bool = False,
         env_options: Mapping[str, Any] | None = None,
     ) -> None:
+        check_seed(seed)
+        check_whole(repeats=repeats)
+        if steps is not None:
+            check_whole(steps=steps)
         if repeats < 1:
             raise NichechainError(f"repeats is {repeats}, but at least 1 is needed")
         if steps is not None and steps < 1:
@@ -277,9 +283,11 @@ class GymDomain:
             if bounds is None:
                 low, high = self._observations.low, self._observations.high
                 bounds = [(float(low[column]), float(high[column])) for column in columns]
-        if bounds is None or not np.isfinite(bounds).all():
+        pairs = () if bounds is None else as_bounds(bounds)
+        if bounds is None or not np.isfinite(pairs).all():
             raise NichechainError(f"{self.name} has no finite bounds of behavior of its own: give bounds")
-        return tuple((float(low), float(high)) for low, high in bounds)
+        check_bounds(pairs)
+        return pairs
 
     def _run(
         self, rows: Float32s, resets: NDArray[np.int64], noise: Noise, seeds: NDArray[np.int64]

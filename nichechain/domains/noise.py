@@ -15,6 +15,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from nichechain.arguments import check_numbers, check_whole
 from nichechain.domains.base import Domain, Evaluation, check_genotypes
 from nichechain.domains.wrapper import Wrapper
 from nichechain.errors import NichechainError
@@ -49,6 +50,7 @@ class Noise:
     def __post_init__(self) -> None:
         for field in fields(self):
             value = getattr(self, field.name)
+            check_numbers(**{field.name: value})
             if not (math.isfinite(value) and value >= 0):
                 raise NichechainError(f"noise of {field.name} is {value}, but must be a number from 0")
 
@@ -246,6 +248,7 @@ class Noisy(Wrapper):
     def __init__(self, domain: Domain, noise: Noise, *, repeats: int = 5) -> None:
         if not isinstance(domain, Perturbable):
             raise NichechainError(f"noise cannot act on {domain.name}: it has no method evaluate_noisy")
+        check_whole(repeats=repeats)
         if repeats < 1:
             raise NichechainError(f"repeats is {repeats}, but at least 1 is needed")
         super().__init__(domain)
@@ -310,6 +313,8 @@ class WithSensitivity(Wrapper):
                 f"{', '.join(domain.behavior_names)}, each once"
             )
         extents = [high - low for low, high in domain.bounds]
+        if most is not None:
+            check_numbers(most=most)
         self.most = min(extents) / 4 if most is None else float(most)
         if not (math.isfinite(self.most) and self.most > 0):
             raise NichechainError(f"the most sensitivity is {self.most}, but must be a positive number")

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from nichechain.arguments import check_sample, check_seed, rng_of
 from nichechain.domains.base import Evaluation, check_genotypes
 from nichechain.domains.noise import Noise, check_seeds
 
@@ -46,6 +47,7 @@ class ToyMap:
     start: Floats | None = None
 
     def __init__(self, *, seed: int = 0) -> None:
+        check_seed(seed)
         self.seed = int(seed)
 
     def __repr__(self) -> str:
@@ -57,7 +59,8 @@ class ToyMap:
 
     def sample(self, n: int, *, seed: int | np.random.Generator) -> NDArray[np.float32]:
         """Genomes uniform in [-0.5, 0.5]², as in the study, (n, 2)."""
-        return np.random.default_rng(seed).uniform(-0.5, 0.5, (n, 2)).astype(np.float32)
+        check_sample(n)
+        return rng_of(seed).uniform(-0.5, 0.5, (n, 2)).astype(np.float32)
 
     def evaluate(self, genotypes: ArrayLike) -> Evaluation:
         """Behavior of each genome (N, 2)."""

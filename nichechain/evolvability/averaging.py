@@ -9,6 +9,7 @@ from typing import Literal, TypeAlias, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from nichechain.arguments import check_whole
 from nichechain.chain.draws import generations
 from nichechain.chain.model import Matrix, NicheChain
 from nichechain.coverage import check_lengths, expected_coverage, sampled_coverage
@@ -99,6 +100,7 @@ def check(
     ):
         if value not in allowed:
             raise NichechainError(f"{name} is {value!r}, but must be one of {', '.join(allowed)}")
+    check_whole(repeats=repeats, draws=draws)
     for name, number in (("repeats", repeats), ("draws", draws)):
         if number < 1:
             raise NichechainError(f"{name} is {number}, but at least 1 is needed")

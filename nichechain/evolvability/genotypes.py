@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from nichechain.arguments import check_numbers, check_whole
 from nichechain.chain.draws import Root, transition_draws
 from nichechain.chain.model import NicheChain
 from nichechain.coverage import rarefied_coverage
@@ -90,10 +91,13 @@ def genotype_evolvability(
     Source: the paper's procedure, steps 2 to 7.
     """
     check(l, lineages, method, convention, repeats, draws)
+    check_whole(offspring=offspring)
     if offspring < 1:
         raise NichechainError(f"offspring is {offspring}, but at least 1 is needed")
     if first_generation not in get_args(FirstGeneration):
         raise NichechainError(f"first_generation is {first_generation!r}, but must be posterior or empirical")
+    if strength is not None:
+        check_numbers(strength=strength)
     if strength is not None and not (math.isfinite(strength) and strength > 0):
         raise NichechainError(f"strength is {strength}, but must be a positive number")
     chain = archive.chain() if chain is None else chain

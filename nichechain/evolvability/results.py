@@ -8,7 +8,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from nichechain.arguments import check_whole
 from nichechain.chain.model import NicheChain
+from nichechain.notebook import facts_table
 
 Floats = NDArray[np.float64]
 
@@ -53,6 +55,20 @@ class Evolvability:
     saturated: bool
     offspring: int | None = None
 
+    def _repr_html_(self) -> str:
+        return facts_table(
+            f"{self.l}-evolvability: {self.value:.2f} niches",
+            {
+                "90 % interval": f"{self.low:.2f} to {self.high:.2f}",
+                "standard error": self.standard_error,
+                "lineages": f"{self.lineages}, saturated" if self.saturated else self.lineages,
+                "births behind the row": "T is given" if self.births is None else self.births,
+                "estimator": self.estimator,
+                "convention": self.convention,
+                "method": self.method,
+            },
+        )
+
     def __str__(self) -> str:
         return (
             f"{self.value:.2f} niches ({self.low:.2f} to {self.high:.2f}; l = {self.l}, "
@@ -76,6 +92,21 @@ class NicheEvolvability:
     estimator: str
     saturated: bool
 
+    def _repr_html_(self) -> str:
+        best = int(np.argmax(self.value))
+        return facts_table(
+            f"{self.l}-evolvability of {self.value.size} niches",
+            {
+                "mean": float(self.value.mean()),
+                "largest": f"{self.value[best]:.2f}, niche number {best}",
+                "births behind its row": "T is given" if self.births is None else self.births[best],
+                "lineages": f"{self.lineages}, saturated" if self.saturated else self.lineages,
+                "estimator": self.estimator,
+                "convention": self.convention,
+                "method": self.method,
+            },
+        )
+
     def to_frame(self, chain: NicheChain) -> pd.DataFrame:
         """One row per niche, with its label."""
         columns = {
@@ -95,6 +126,7 @@ class NicheEvolvability:
 
         A niche that births say little about would rank by its prior.
         """
+        check_whole(min_births=min_births)
         frame = self.to_frame(chain)
         if self.births is not None:
             frame = frame[frame["births"] >= min_births]

@@ -13,6 +13,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from nichechain.arguments import check_numbers, check_whole
 from nichechain.chain.base_measure import BaseMeasure
 from nichechain.chain.comparison import counts_of_families, families_of
 from nichechain.chain.counts import TransitionCounts
@@ -97,6 +98,7 @@ def prior_sensitivity(
     Theory and Bayesian Analysis, section 4.7. The band is no interval of a given probability. It
     contains the error of the draws, which :attr:`NicheEvolvability.standard_error` tells.
     """
+    check_numbers(factor=factor)
     if not (math.isfinite(factor) and factor > 1):
         raise NichechainError(f"factor is {factor:g}, but must be a number greater than 1")
     effect = design_effect(counts)
@@ -173,6 +175,7 @@ def bootstrap_elites(
     niche of m elites the spread is short by √((m − 1)/m), so a niche of one elite adds none.
     What the few draws of each resample leave open adds to the spread.
     """
+    check_whole(resamples=resamples)
     if resamples < 2:
         raise NichechainError(f"resamples is {resamples}, but must be at least 2")
     if not len(counts.families):

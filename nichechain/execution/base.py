@@ -11,6 +11,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from nichechain.arguments import check_whole
 from nichechain.domains.base import Domain, Evaluation
 from nichechain.errors import NichechainError
 
@@ -149,6 +150,7 @@ def count_workers(workers: int | None) -> int:
         If it is below 1.
     """
     count = available_cpus() if workers is None else workers
+    check_whole(workers=count)
     if count < 1:
         raise NichechainError(f"workers is {count}, but at least 1 is needed")
     return count

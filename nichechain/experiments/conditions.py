@@ -149,7 +149,7 @@ def selection_of(level: str) -> Selection:
         return named[level]
     try:
         fraction = float(level)
-    except ValueError:
+    except (TypeError, ValueError):
         raise NichechainError(
             f"level is {level!r}, but must be selective, better, random, or a fraction above 0 and at most 1"
         ) from None

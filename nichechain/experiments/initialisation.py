@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from nichechain.arguments import check_sample, rng_of
 from nichechain.controllers import MLP
 from nichechain.domains.base import Domain
 from nichechain.errors import NichechainError
@@ -49,7 +50,8 @@ def initialise(domain: Domain, scheme: str, n: int, *, seed: int | np.random.Gen
         If there is no such scheme, or the domain's genotypes are no network's weights.
     """
     factor = check_scheme(scheme)
-    rng = np.random.default_rng(seed)
+    check_sample(n)
+    rng = rng_of(seed)
     shape = (n, domain.genotype_length)
     kind, _, rest = scheme.partition(":")
     if kind == "elites":
@@ -85,7 +87,7 @@ def check_scheme(scheme: str) -> float:
     NichechainError
         If there is no such scheme or the factor is not positive.
     """
-    kind, colon, text = scheme.partition(":")
+    kind, colon, text = str(scheme).partition(":")
     if (kind in NETWORK_SCHEMES and not colon) or (kind == "elites" and text):
         return 1.0
     if kind in SCALED_SCHEMES:

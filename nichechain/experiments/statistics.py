@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from nichechain.arguments import as_floats, check_whole
 from nichechain.errors import NichechainError
 from nichechain.experiments.results import Effect, GroupTest, HypothesisTest, Interval, Pair
 from nichechain.randomness import Purpose, keyed
@@ -337,6 +338,9 @@ def _interval(
     """BCa bootstrap interval, or the percentile interval where BCa is undefined."""
     from scipy import stats
 
+    check_whole(resamples=resamples)
+    if resamples < 1:
+        raise NichechainError(f"resamples is {resamples}, but must be at least 1")
     # A level with one run cannot be jackknifed, and a bootstrap would repeat that run for ever.
     if min(map(len, samples)) < 2:
         return None
@@ -363,7 +367,7 @@ def _interval(
 
 
 def _finite(name: str, values: ArrayLike) -> Floats:
-    array = np.asarray(values, np.float64)
+    array = as_floats(name, values)
     if array.ndim != 1:
         raise NichechainError(f"{name} have shape {array.shape}, but must be one number per run")
     if not np.isfinite(array).all():

@@ -7,6 +7,7 @@ from dataclasses import MISSING, asdict, dataclass, field, fields, replace
 from typing import Any, Literal, get_args
 
 from nichechain import domains
+from nichechain.arguments import check_whole
 from nichechain.config import DomainOption, plain_options
 from nichechain.domains.base import Domain
 from nichechain.errors import NichechainError
@@ -90,6 +91,7 @@ class Study:
     def __post_init__(self) -> None:
         if self.kind not in get_args(Kind):
             raise NichechainError(f"kind is {self.kind!r}, but must be one of {', '.join(get_args(Kind))}")
+        check_whole(runs=self.runs, steps=self.steps, seed=self.seed, domain_seed=self.domain_seed)
         if self.runs < 1:
             raise NichechainError(f"runs is {self.runs}, but must be at least 1")
         for name in ("steps", "seed", "domain_seed"):

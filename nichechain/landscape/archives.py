@@ -12,6 +12,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from nichechain.arguments import as_floats, check_numbers, check_seed, check_whole
 from nichechain.errors import NichechainError
 from nichechain.landscape.behaviors import (
     expected_global_sensitivity,
@@ -211,7 +212,7 @@ class Landscape:
         """
         from scipy import stats
 
-        other = np.asarray(values, np.float64)
+        other = as_floats("values", values)
         if other.shape != (len(self.niches),):
             raise NichechainError(
                 f"values have shape {other.shape}, but there must be one for each of "
@@ -282,8 +283,10 @@ def measure_archive(
         the file does not fit.
     """
     check_sample_size(offspring)
-    if seed < 0:
-        raise NichechainError(f"seed is {seed}, but must not be negative")
+    check_seed(seed)
+    check_numbers(share=share)
+    if elites is not None:
+        check_whole(elites=elites)
     if not 0 < share <= 1:
         raise NichechainError(f"share is {share}, but must be above 0 and at most 1")
     if elites is not None and elites < 1:

@@ -13,6 +13,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from nichechain.arguments import as_floats, as_whole, check_numbers, check_whole
 from nichechain.births import NONE
 from nichechain.diversity.arrays import ordered_sum, present
 from nichechain.errors import NichechainError
@@ -101,7 +102,7 @@ def evolvability(offspring: ArrayLike) -> Floats:
     (...) array
         At most twice the local sensitivity, up to rounding; 0 for a single one, NaN where all failed.
     """
-    points = np.asarray(offspring, np.float64)
+    points = _sample(offspring)
     widest = np.fmax.reduce(_pairwise(points), axis=-1, initial=0.0)
     return np.where(present(points).any(axis=-1), widest, np.nan)[()]
 
@@ -123,7 +124,7 @@ def expected_evolvability(offspring: ArrayLike) -> Floats:
     The mean runs over pairs of distinct offspring, not of distinct behaviors; the paper's
     card(S − 1) reads card(S) − 1.
     """
-    return _mean(_pairwise(np.asarray(offspring, np.float64)))
+    return _mean(_pairwise(_sample(offspring)))
 
 
 def population_evolvability(population: ArrayLike) -> Floats:
@@ -157,7 +158,12 @@ def one_hot_evolvability(niche: ArrayLike, niches: int) -> Floats:
     (...) array
         It grows with the sample: report the size beside it.
     """
-    state = np.asarray(niche, np.int64)
+    state = as_whole("niche", niche)
+    check_whole(niches=niches)
+    if niches < 1:
+        raise NichechainError(f"niches is {niches}, but at least 1 is needed")
+    if not state.ndim:
+        raise NichechainError("niche has shape (), but must be (..., n), one state per offspring")
     ordered = np.sort(np.where((state != NONE) & (state < niches), state, NONE), axis=-1)
     new = ordered != NONE
     new[..., 1:] &= ordered[..., 1:] != ordered[..., :-1]
@@ -184,9 +190,15 @@ def dissimila_ratio(evolvability: ArrayLike, sensitivity: ArrayLike, epsilon: fl
     NichechainError
         If ``epsilon`` is not positive.
     """
+    check_numbers(epsilon=epsilon)
     if not epsilon > 0:
         raise NichechainError(f"epsilon is {epsilon}, but must be positive")
-    return np.asarray(evolvability, np.float64) / (np.asarray(sensitivity, np.float64) + epsilon)
+    reached, spread = as_floats("evolvability", evolvability), as_floats("sensitivity", sensitivity)
+    if reached.shape != spread.shape:
+        raise NichechainError(
+            f"evolvability and sensitivity have shapes {reached.shape} and {spread.shape}, but must be alike"
+        )
+    return reached / (spread + epsilon)
 
 
 def hull_volume(behaviors: ArrayLike) -> float:
@@ -204,7 +216,11 @@ def hull_volume(behaviors: ArrayLike) -> float:
         In units of behavior to the power of B. 0 where the points span fewer than B dimensions,
         NaN where all failed.
     """
-    given = np.asarray(behaviors, np.float64)
+    given = as_floats("behaviors", behaviors)
+    if given.ndim != 2 or not given.shape[1] or np.isinf(given).any():
+        raise NichechainError(
+            f"behaviors have shape {given.shape} or infinite values, but must be (n, B) and finite or NaN"
+        )
     points = given[present(given)]
     if not len(points):
         return np.nan
@@ -222,9 +238,22 @@ def hull_volume(behaviors: ArrayLike) -> float:
     return float(ConvexHull(centered @ direction.T / extent).volume * np.prod(extent))
 
 
+def _sample(offspring: ArrayLike) -> Floats:
+    points = as_floats("offspring", offspring)
+    if points.ndim < 2 or not points.shape[-1]:
+        raise NichechainError(f"offspring has shape {points.shape}, but must be (..., n, B)")
+    return points
+
+
 def _to_parent(parent: ArrayLike, offspring: ArrayLike) -> Floats:
     """Distances (..., n) between parents and offspring."""
-    return _norm(np.asarray(offspring, np.float64) - np.asarray(parent, np.float64)[..., None, :])
+    root, born = as_floats("parent", parent), _sample(offspring)
+    if root.shape != (*born.shape[:-2], born.shape[-1]):
+        raise NichechainError(
+            f"parent and offspring have shapes {root.shape} and {born.shape}, "
+            "but must be (..., B) and (..., n, B)"
+        )
+    return _norm(born - root[..., None, :])
 
 
 def _pairwise(points: Floats) -> Floats:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from nichechain.arguments import as_floats, check_numbers
 from nichechain.errors import NichechainError
 
 Floats = NDArray[np.float64]
@@ -59,11 +60,12 @@ def find_dissimila(
     NichechainError
         If ``share`` is outside (0, 1], ``neutral`` is negative or the shapes differ.
     """
+    check_numbers(share=share, neutral=neutral)
     if not 0 < share <= 1:
         raise NichechainError(f"share is {share}, but must be above 0 and at most 1")
     if not neutral >= 0:
         raise NichechainError(f"neutral is {neutral}, but must not be negative")
-    value, spread = np.asarray(ratio, np.float64), np.asarray(sensitivity, np.float64)
+    value, spread = as_floats("ratio", ratio), as_floats("sensitivity", sensitivity)
     if value.ndim != 1 or value.shape != spread.shape:
         raise NichechainError(
             f"ratio and sensitivity have shapes {value.shape} and {spread.shape}, "

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from nichechain.arguments import as_floats
 from nichechain.births import NONE
 from nichechain.domains.base import Domain, Evaluation, check_genotypes
 from nichechain.errors import NichechainError
@@ -67,7 +68,7 @@ def measure(
     epsilon: float = EPSILON,
 ) -> LandscapeMeasures:
     """All local measures of one genotype (P,); the rest is as in :func:`measure_all`."""
-    genotypes = np.asarray(genotype)[None]
+    genotypes = as_floats("genotype", genotype)[None]
     return measure_all(
         domain, genotypes, mutate, sample_size, seed, executor, niches=niches, epsilon=epsilon
     )[0]

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from nichechain.arguments import as_floats, check_whole
 from nichechain.births import NONE
 from nichechain.diversity.arrays import present
 from nichechain.errors import NichechainError
@@ -122,7 +123,7 @@ def find_measure(name: str) -> Measure:
     NichechainError
         If there is none.
     """
-    found = MEASURES.get(name.strip().replace("-", "_"))
+    found = MEASURES.get(str(name).strip().replace("-", "_"))
     if found is None:
         known = ", ".join(known.replace("_", "-") for known in MEASURES)
         raise NichechainError(f"there is no measure {name!r}: it must be one of {known}")
@@ -168,7 +169,7 @@ def measure_behaviors(
         If the shapes do not fit together, a sample has fewer than 2 offspring, or a behavior is
         infinite.
     """
-    roots, born = np.asarray(parent, np.float64), np.asarray(offspring, np.float64)
+    roots, born = as_floats("parent", parent), as_floats("offspring", offspring)
     if roots.ndim != 2 or born.ndim != 3 or (len(born), born.shape[2]) != roots.shape:
         raise NichechainError(
             f"parent and offspring have shapes {roots.shape} and {born.shape}, "
@@ -212,6 +213,7 @@ def check_sample_size(size: int) -> None:
     NichechainError
         If it is below 2.
     """
+    check_whole(sample_size=size)
     if size < 2:
         raise NichechainError(f"sample_size is {size}, but evolvability needs at least 2 offspring")
 

@@ -7,6 +7,7 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from nichechain.arguments import as_floats
 from nichechain.errors import NichechainError
 
 Floats = NDArray[np.float64]
@@ -87,6 +88,10 @@ class Niches(Protocol):
         ...
 
 
+MOST_NICHES = 10_000_000
+"""More than any archive fills; what lies beyond is a mistyped number that no memory holds."""
+
+
 def check_bounds(bounds: Bounds) -> None:
     """Refuse bounds that are not finite and increasing."""
     for low, high in bounds:
@@ -108,7 +113,7 @@ def checked_behavior(behavior: ArrayLike, axes: int) -> Floats:
     NichechainError
         If the shape does not fit or a value is not finite.
     """
-    points = np.asarray(behavior, np.float64)
+    points = as_floats("behavior", behavior)
     if points.ndim != 2 or points.shape[1] != axes:
         raise NichechainError(f"behavior has shape {points.shape}, but must be (N, {axes})")
     if not np.isfinite(points).all():

@@ -10,8 +10,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from nichechain.arguments import as_bounds, as_floats, check_whole
 from nichechain.errors import NichechainError
 from nichechain.niches.base import (
+    MOST_NICHES,
     Bounds,
     Floats,
     Ints,
@@ -67,10 +69,10 @@ class CVTNiches:
     kind = "cvt"
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "bounds", tuple((float(a), float(b)) for a, b in self.bounds))
+        object.__setattr__(self, "bounds", as_bounds(self.bounds))
         check_bounds(self.bounds)
         check_outside(self.outside)
-        centroids = np.array(self.centroids, np.float64)
+        centroids = as_floats("centroids", self.centroids).copy()
         if centroids.ndim != 2 or not centroids.size or centroids.shape[1] != len(self.bounds):
             raise NichechainError(
                 f"centroids have shape {centroids.shape}, but must be (n, {len(self.bounds)})"
@@ -107,8 +109,10 @@ class CVTNiches:
         Lloyd's k-means on uniform samples of the box, a hundred for each niche. Every sum is made
         in one order, so that neither threads nor libraries that share them change the centroids.
         """
-        if number < 1:
-            raise NichechainError(f"niches are {number}, but at least 1 is needed")
+        check_whole(niches=number)
+        if not 1 <= number <= MOST_NICHES:
+            raise NichechainError(f"niches are {number}, but must be from 1 to {MOST_NICHES}")
+        bounds = as_bounds(bounds)
         check_bounds(bounds)
         return cls(_lloyd(number, np.array(bounds, np.float64), seed), bounds, outside)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import operator
 from dataclasses import dataclass
 from typing import Any
@@ -9,8 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from nichechain.arguments import as_bounds, as_shape
 from nichechain.errors import NichechainError
 from nichechain.niches.base import (
+    MOST_NICHES,
     Floats,
     Ints,
     Niche,
@@ -53,10 +56,12 @@ class GridNiches:
     kind = "grid"
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "shape", tuple(int(k) for k in self.shape))
-        object.__setattr__(self, "bounds", tuple((float(a), float(b)) for a, b in self.bounds))
+        object.__setattr__(self, "shape", as_shape(self.shape))
+        object.__setattr__(self, "bounds", as_bounds(self.bounds))
         if not self.shape or min(self.shape) < 1:
             raise NichechainError(f"grid shape is {self.shape}, but every axis needs at least 1 cell")
+        if len(self) > MOST_NICHES:
+            raise NichechainError(f"grid shape is {self.shape}, but a grid has at most {MOST_NICHES} cells")
         if len(self.shape) != len(self.bounds):
             raise NichechainError(
                 f"grid has {len(self.shape)} axes but bounds have {len(self.bounds)}: one pair per axis"
@@ -66,7 +71,7 @@ class GridNiches:
 
     def __len__(self) -> int:
         """Number of niches; the outside state is not one."""
-        return int(np.prod(self.shape))
+        return math.prod(self.shape)
 
     @property
     def states(self) -> int:
@@ -161,4 +166,8 @@ class GridNiches:
     def as_grid(self, values: ArrayLike) -> NDArray[Any]:
         """Values of all niches (n,) laid out as the grid."""
         array: NDArray[Any] = np.asarray(values)
+        if array.shape != (len(self),):
+            raise NichechainError(
+                f"values have shape {array.shape}, but must be ({len(self)},), one per niche of the grid"
+            )
         return array.reshape(self.shape)

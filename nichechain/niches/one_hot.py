@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from nichechain.arguments import as_floats
 from nichechain.niches.base import Floats, Niches
 
 
@@ -34,7 +35,7 @@ def one_hot(behavior: ArrayLike, niches: Niches) -> Floats:
     measures of :mod:`nichechain.landscape` take this form like any behavior: η* is then √2 times
     the probability that two offspring fall in different niches.
     """
-    points = np.asarray(behavior, np.float64)
+    points = as_floats("behavior", behavior)
     flat = points.reshape(-1, points.shape[-1]) if points.ndim else points
     known = ~np.isnan(flat).any(axis=-1)
     state = niches.of(flat[known])

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from nichechain.arguments import check_whole
 from nichechain.errors import NichechainError
 from nichechain.plots.style import EDGE, FAINT, INK, LONG_JUMP
 
@@ -38,6 +39,7 @@ def plot_calibration(check: DirectCheck, ax: Axes, *, generation: int) -> Axes:
         If there is no such generation.
     """
     last = check.reached.shape[1]
+    check_whole(generation=generation)
     if not 1 <= generation <= last:
         raise NichechainError(f"generation is {generation}, but must be between 1 and {last}")
     k = generation - 1

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from nichechain.arguments import check_whole
 from nichechain.chain.draws import transition_draws
 from nichechain.chain.model import NicheChain
 from nichechain.coverage import coverage_by_generation
@@ -98,6 +99,7 @@ def plot_lineages(
     NichechainError
         As in :func:`plot_generations`.
     """
+    check_whole(most=most)
     if most < 2:
         raise NichechainError(f"most is {most}, but must be at least 2")
     sizes = np.unique(np.round(np.geomspace(1, most, 17)).astype(np.int64))
@@ -113,6 +115,7 @@ def _covered(
     """Coverage (draws, niches, generations, lineages)."""
     if not 1 <= len(niches) <= len(_COLORS):
         raise NichechainError(f"{len(niches)} niches are given, but one to {len(_COLORS)} can be told apart")
+    check_whole(draws=draws)
     if draws < 1:
         raise NichechainError(f"draws is {draws}, but at least 1 is needed")
     roots = [chain.state(niche) for niche in niches]

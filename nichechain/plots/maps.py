@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from nichechain.arguments import check_whole
 from nichechain.plots.cells import fill, hatch
 from nichechain.plots.style import EMPTY, behavior_axes, colorbar, key, on_map
 
@@ -87,6 +88,7 @@ def plot_evolvability(archive: Archive, scores: NicheEvolvability, ax: Axes, *, 
     -------
     matplotlib.axes.Axes
     """
+    check_whole(min_births=min_births)
     from matplotlib.patches import Patch
 
     births = archive.counts.births[: len(archive.niches)]

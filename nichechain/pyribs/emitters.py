@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from ribs.emitters import EmitterBase
 
+from nichechain.arguments import as_floats, check_seed, check_whole
 from nichechain.errors import NichechainError
 from nichechain.variation import Mutation
 
@@ -46,11 +47,14 @@ class MutationEmitter(EmitterBase):
         super().__init__(
             archive, solution_dim=archive.solution_dim, bounds=None, lower_bounds=None, upper_bounds=None
         )
-        initial = np.asarray(initial_solutions, archive.dtypes["solution"])
+        initial = as_floats("initial_solutions", initial_solutions).astype(archive.dtypes["solution"])
         if initial.ndim != 2 or not len(initial) or initial.shape[1] != archive.solution_dim:
             raise NichechainError(
                 f"initial solutions have shape {initial.shape}, but must be (n, {archive.solution_dim})"
             )
+        check_whole(batch_size=batch_size)
+        if seed is not None:
+            check_seed(seed)
         if batch_size < 1:
             raise NichechainError(f"batch_size is {batch_size}, but must be at least 1")
         self.batch_size = batch_size

@@ -16,6 +16,7 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy import stats
 
+from nichechain.arguments import check_whole
 from nichechain.births import NONE
 from nichechain.chain.model import Matrix, NicheChain
 from nichechain.coverage import expected_coverage, rarefied_coverage
@@ -172,6 +173,7 @@ def compare(
     NichechainError
         If ``draws`` is below 1.
     """
+    check_whole(draws=draws)
     if draws < 1:
         raise NichechainError(f"draws is {draws}, but at least 1 is needed")
     roots, size, generations = lineages.states.shape

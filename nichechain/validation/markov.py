@@ -15,6 +15,7 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import NDArray
 
+from nichechain.arguments import check_whole
 from nichechain.errors import NichechainError
 from nichechain.randomness import Purpose, keyed
 from nichechain.validation.lineages import Triples
@@ -93,6 +94,7 @@ def lineage_test(
     NichechainError
         If a number is out of range.
     """
+    check_whole(depth_bins=depth_bins)
     if depth_bins < 1:
         raise NichechainError(f"depth bins are {depth_bins}, but at least 1 is needed")
     known = triples.with_grandparent
@@ -277,6 +279,7 @@ def p_value(observed: float, permuted: Floats) -> float:
 
 def check_permutations(permutations: int) -> None:
     """Refuse a permutation test without permutations."""
+    check_whole(permutations=permutations)
     if permutations < 1:
         raise NichechainError(f"permutations are {permutations}, but at least 1 is needed")
 

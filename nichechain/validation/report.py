@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 
 from nichechain.archive import Archive
+from nichechain.arguments import check_seed, check_whole
 from nichechain.errors import NichechainError
 from nichechain.execution import Executor
 from nichechain.validation import chapman_kolmogorov
@@ -53,13 +54,14 @@ class ValidationConfig:
     seed: int = 0
 
     def __post_init__(self) -> None:
+        check_whole(elites=self.elites)
         for name in ("lineages", "l", "offspring"):
+            check_whole(**{name: getattr(self, name)})
             if getattr(self, name) < 1:
                 raise NichechainError(f"{name} is {getattr(self, name)}, but must be at least 1")
         if self.elites < 3:
             raise NichechainError(f"elites is {self.elites}, but a rank correlation needs at least 3")
-        if self.seed < 0:
-            raise NichechainError(f"seed is {self.seed}, but must not be negative")
+        check_seed(self.seed)
         check_permutations(self.permutations)
 
     @property

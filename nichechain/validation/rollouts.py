@@ -10,6 +10,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from nichechain.archive import Archive
+from nichechain.arguments import check_whole
 from nichechain.births import NONE
 from nichechain.chain.model import NicheChain
 from nichechain.coverage import check_lengths
@@ -103,6 +104,7 @@ def sample_roots(
     NichechainError
         If fewer than 3 are asked for or qualify.
     """
+    check_whole(elites=size, min_births=min_births)
     if size < 3:
         raise NichechainError(f"elites are {size}, but a rank correlation needs at least 3")
     assert chain.births is not None
@@ -157,6 +159,7 @@ def run_lineages(
         If a number is out of range or a niche is empty.
     """
     check_lengths(l, lineages)
+    check_whole(offspring=offspring)
     if offspring < 1:
         raise NichechainError(f"offspring is {offspring}, but at least 1 is needed")
     elites = [archive.elite(int(root)).genotype for root in roots]

@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
+from nichechain.arguments import as_whole, check_numbers, check_whole
 from nichechain.births import NONE
 from nichechain.chain.model import Matrix, NicheChain
 from nichechain.coverage import entries
@@ -53,7 +54,9 @@ def simulate_births(
     NichechainError
         If a number is out of range.
     """
-    first = np.atleast_1d(np.asarray(start, np.int64))
+    check_whole(births=births, batch=batch)
+    check_numbers(memory=memory)
+    first = np.atleast_1d(as_whole("start", start))
     if not 0 <= first.min(initial=0) <= first.max(initial=0) < chain.states or not first.size:
         raise NichechainError(f"start is {first.tolist()}, but must be states from 0 to {chain.states - 1}")
     if births < first.size or batch < 1:
@@ -121,10 +124,13 @@ def simulate_lineages(matrix: Matrix, first: ArrayLike, generations: int, rng: n
     NichechainError
         If ``generations`` is below 1.
     """
+    check_whole(l=generations)
     if generations < 1:
         raise NichechainError(f"l is {generations}, but a lineage has at least 1 generation")
     draw = RowSampler(matrix)
-    here = np.asarray(first, np.int64)
+    here = as_whole("first", first)
+    if here.size and not 0 <= here.min() <= here.max() < matrix.shape[0]:
+        raise NichechainError(f"first is {here.tolist()}, but must be states from 0 to {matrix.shape[0] - 1}")
     states = [here]
     for _ in range(generations - 1):
         here = draw(here.ravel(), rng).reshape(here.shape)

@@ -8,6 +8,7 @@ from typing import Any, Protocol, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from nichechain.arguments import check_numbers
 from nichechain.config import StepBound
 from nichechain.errors import NichechainError
 from nichechain.variation.noise import IndependentNoise, Noise, truncated
@@ -60,6 +61,7 @@ class Bound:
             raise NichechainError(
                 f"step bound is of kind {self.kind!r}, but must be one of {', '.join(BOUND_KINDS)}"
             )
+        check_numbers(step_bound=self.size)
         if not (np.isfinite(self.size) and self.size > 0):
             raise NichechainError(f"step bound is {self.size:g}, but must be a positive number")
 
@@ -101,6 +103,7 @@ class AdditiveMutation:
     layer_scales: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
+        check_numbers(mutation_scale=self.scale)
         if not (np.isfinite(self.scale) and self.scale > 0):
             raise NichechainError(f"mutation scale is {self.scale}, but must be a positive number")
         if len(self.layers) != len(self.layer_scales):
@@ -109,6 +112,7 @@ class AdditiveMutation:
                 f"({_listed(self.layers)} weights): one scale per layer"
             )
         for scale in self.layer_scales:
+            check_numbers(layer_scale=scale)
             if not (np.isfinite(scale) and scale > 0):
                 raise NichechainError(f"layer scale is {scale:g}, but must be a positive number")
         check_bound(self.noise, self.bound)

@@ -8,6 +8,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
+from nichechain.arguments import check_numbers
 from nichechain.errors import NichechainError
 
 Floats = NDArray[np.float64]
@@ -89,6 +90,7 @@ class StudentTNoise:
     df: float = 3.0
 
     def __post_init__(self) -> None:
+        check_numbers(df=self.df)
         if not (np.isfinite(self.df) and self.df > 0):
             raise NichechainError(f"df is {self.df:g}, but degrees of freedom are a positive number")
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from nichechain.arguments import check_numbers, check_whole
 from nichechain.domains.base import Domain, Evaluation, check_genotypes
 from nichechain.domains.wrapper import Wrapper
 from nichechain.errors import NichechainError
@@ -47,6 +48,8 @@ class SelfAdaptiveMutation:
     bound: Bound | None = None
 
     def __post_init__(self) -> None:
+        for weights in self.layers:
+            check_whole(weights_of_a_layer=weights)
         if not self.layers or min(self.layers) < 1:
             raise NichechainError(f"layers are {self.layers}, but each has at least 1 weight")
         check_bound(self.noise, self.bound)
@@ -80,7 +83,10 @@ class SelfAdaptiveDomain(Wrapper):
     """
 
     def __init__(self, domain: Domain, step_sizes: tuple[float, ...]) -> None:
+        if not step_sizes:
+            raise NichechainError("step_sizes is empty, but there must be one for each layer, or one for all")
         for size in step_sizes:
+            check_numbers(step_size=size)
             if not (np.isfinite(size) and size > 0):
                 raise NichechainError(f"step size is {size:g}, but must be a positive number")
         super().__init__(domain)

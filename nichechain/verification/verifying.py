@@ -11,6 +11,7 @@ import numpy as np
 
 from nichechain import store
 from nichechain.archive import Archive, load
+from nichechain.arguments import check_seed, check_whole
 from nichechain.births import Offspring
 from nichechain.domains.base import Domain, Evaluation
 from nichechain.errors import NichechainError
@@ -85,10 +86,11 @@ def verify(
     found only if it is evaluated again: of k such births among N, a sample of n contains one
     with probability 1 - C(N - k, n) / C(N, n), about 1 - (1 - n/N)^k.
     """
+    if sample is not None:
+        check_whole(sample=sample)
     if sample is not None and sample < 0:
         raise NichechainError(f"sample is {sample}, but must not be negative")
-    if seed < 0:
-        raise NichechainError(f"seed is {seed}, but must not be negative")
+    check_seed(seed)
     archive = archive if isinstance(archive, Archive) else load(archive)
     with ExitStack() as stack:
         if executor is None:

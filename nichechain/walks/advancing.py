@@ -14,6 +14,7 @@ import pyarrow as pa
 from numpy.typing import ArrayLike, NDArray
 
 from nichechain import births
+from nichechain.arguments import as_floats, as_whole
 from nichechain.births import NONE, Offspring
 from nichechain.diversity import NoveltyArchive, Surroundings
 from nichechain.domains.base import Domain, Evaluation
@@ -119,7 +120,7 @@ class Walks:
             seeds = [run_seed(self._config.seed, number) for number in run.tolist()]
             first = np.stack([self._domain.sample(width, seed=keyed(s, Purpose.INITIAL)) for s in seeds])
         else:
-            first = np.asarray(genotypes, np.float32)
+            first = as_floats("start genotypes", genotypes).astype(np.float32)
             expected = (len(run), length) if self._config.states is None else (len(run), width, length)
             if first.shape != expected:
                 raise NichechainError(f"start genotypes have shape {first.shape}, but must be {expected}")
@@ -358,7 +359,7 @@ def run_numbers(runs: int | Sequence[int]) -> Ints:
     NichechainError
         If there is none, or a number is negative.
     """
-    run: Ints = np.arange(runs) if isinstance(runs, (int, np.integer)) else np.asarray(runs, np.int64)
-    if not run.size or run.min() < 0:
+    run: Ints = np.arange(runs) if isinstance(runs, (int, np.integer)) else as_whole("runs", runs)
+    if run.ndim != 1 or not run.size or run.min() < 0:
         raise NichechainError(f"runs is {runs}, but at least one run is needed, numbered from 0")
     return run

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from nichechain.arguments import check_seed, check_whole
 from nichechain.diversity import ArchiveRule, KNearest, Metric
 from nichechain.errors import NichechainError
 from nichechain.randomness import Purpose, keyed
@@ -50,12 +51,14 @@ class WalkConfig:
     seed: int = 0
 
     def __post_init__(self) -> None:
+        check_whole(offspring=self.offspring)
+        if self.states is not None:
+            check_whole(states=self.states)
         if self.offspring < 1:
             raise NichechainError(f"offspring is {self.offspring}, but at least 1 is needed")
         if self.states is not None and self.states < 1:
             raise NichechainError(f"states is {self.states}, but at least 1 is needed")
-        if self.seed < 0:
-            raise NichechainError(f"seed is {self.seed}, but must not be negative")
+        check_seed(self.seed)
 
     @property
     def width(self) -> int:
@@ -65,4 +68,7 @@ class WalkConfig:
 
 def run_seed(seed: int, run: int) -> int:
     """Seed of one run of a configuration: with it, run and uid, any birth of a walk can be replayed."""
+    check_whole(run=run)
+    if run < 0:
+        raise NichechainError(f"run is {run}, but runs are numbered from 0")
     return int(keyed(seed, Purpose.RUN, run).integers(2**63))

@@ -13,6 +13,7 @@ from typing import Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from nichechain.arguments import check_numbers
 from nichechain.errors import NichechainError
 
 Floats = NDArray[np.float64]
@@ -101,6 +102,7 @@ class TopFraction:
     ties: Literal["random", "all"] = "random"
 
     def __post_init__(self) -> None:
+        check_numbers(fraction=self.fraction)
         if not 0 < self.fraction <= 1:
             raise NichechainError(f"fraction is {self.fraction}, but must be above 0 and at most 1")
         if self.ties not in ("random", "all"):
@@ -136,6 +138,7 @@ class AtLeast:
     threshold: float
 
     def __post_init__(self) -> None:
+        check_numbers(threshold=self.threshold)
         if math.isnan(self.threshold):
             raise NichechainError("threshold is nan, but must be a number")
 

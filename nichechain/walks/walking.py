@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 import pyarrow as pa
 from numpy.typing import ArrayLike, NDArray
 
+from nichechain.arguments import as_floats, check_whole
 from nichechain.domains.base import Domain
 from nichechain.errors import NichechainError
 from nichechain.execution import Executor
@@ -39,7 +40,16 @@ class WalkResult:
     births: pa.Table
 
     def series(self, measure: str) -> NDArray[np.float64]:
-        """A measure of :class:`StepRecord` over the steps, (T + 1, R, ...)."""
+        """A measure of :class:`StepRecord` over the steps, (T + 1, R, ...).
+
+        Raises
+        ------
+        NichechainError
+            If it records no such thing.
+        """
+        known = [field.name for field in fields(StepRecord)]
+        if measure not in known:
+            raise NichechainError(f"measure is {measure!r}, but must be one of {', '.join(known)}")
         return np.stack([getattr(record, measure) for record in self.records])
 
     def table(self) -> pa.Table:
@@ -74,6 +84,7 @@ def walk(
     NichechainError
         As there, or if ``steps`` is negative.
     """
+    check_whole(steps=steps)
     if steps < 0:
         raise NichechainError(f"steps is {steps}, but must not be negative")
     walks = Walks(domain, mutate, config, niches)
@@ -107,7 +118,7 @@ def draw_starts(genotypes: ArrayLike, config: WalkConfig, runs: int | Sequence[i
     NichechainError
         If there is no genotype or no run.
     """
-    among = np.asarray(genotypes, np.float32)
+    among = as_floats("genotypes", genotypes).astype(np.float32)
     if among.ndim != 2 or not len(among):
         raise NichechainError(f"genotypes have shape {among.shape}, but must be (K, P) with K at least 1")
     shape = () if config.states is None else (config.states,)

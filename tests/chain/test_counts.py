@@ -158,3 +158,17 @@ def test_births_are_refused(parent, child, message):
 def test_counts_of_other_niches_do_not_merge(other):
     with pytest.raises(NichechainError, match="niches differ"):
         TransitionCounts.from_pairs([0], [1], GRID) + TransitionCounts.from_pairs([0], [1], other)
+
+
+def test_elites_of_two_searches_stay_apart_whatever_their_numbers():
+    """Children of two elites that bear one number are not siblings for that."""
+    niches = GridNiches((4,), ((0.0, 4.0),))
+    numbers = [3, 5, 100], [-7, 0, 1, 2, 3, 5, 50, 100, 101, 250]
+    sides = [
+        TransitionCounts.from_births([0] * len(elites), [1] * len(elites), niches, elite=elites)
+        for elites in numbers
+    ]
+    together = sides[0] + sides[1]
+    assert len(np.unique(together.families[:, :2], axis=0)) == sum(map(len, numbers))
+    assert together.families[:, 3].sum() == sum(map(len, numbers))
+    np.testing.assert_array_equal(together.families[:3], sides[0].families)

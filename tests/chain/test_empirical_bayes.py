@@ -201,3 +201,23 @@ def test_a_posterior_of_related_births_is_wider():
 def _sample(chain, seed):
     drawn = chain.posterior.draw(np.random.default_rng(seed))
     return drawn.toarray() if sparse.issparse(drawn) else drawn
+
+
+def test_a_niche_of_one_elite_says_nothing_of_how_alike_siblings_are():
+    """Without cousins there is nothing to compare siblings with: the other rows decide alone."""
+    rows = [(0, 1, 0), (0, 1, 1), (0, 2, 1), (0, 2, 1), (0, 3, 2), (0, 3, 2)]
+    alone = [(1, 9, 3), (1, 9, 3), (1, 9, 2)]
+    parent, elite, child = np.array(rows).T
+    expected = sibling_correlation(TransitionCounts.from_births(parent, child, ROW, elite=elite))
+    assert 0 < expected < 1
+    parent, elite, child = np.array(rows + alone).T
+    found = sibling_correlation(TransitionCounts.from_births(parent, child, ROW, elite=elite))
+    assert found == expected
+
+
+def test_children_that_all_land_in_one_niche_are_not_alike_for_being_siblings():
+    """Cousins are as alike as can be, so that siblings cannot be more so."""
+    parent, elite = np.zeros(6, int), np.repeat([1, 2, 3], 2)
+    counts = TransitionCounts.from_births(parent, np.ones(6, int), ROW, elite=elite)
+    assert sibling_correlation(counts) == 0.0
+    np.testing.assert_array_equal(design_effect(counts), 1.0)

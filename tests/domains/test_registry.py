@@ -91,7 +91,7 @@ def test_an_archive_of_another_packages_domain(tmp_path):
         ("broken", {}, "domain broken cannot be imported from no_such_package:Domain"),
         ("catapult", {"joints": 3}, "catapult has no option 'joints': it has weight, noise, repeats"),
         ("arm", {"joints": 0}, "joints is 0"),
-        ("arm", {"joints": "many"}, "options {'joints': 'many'} do not fit arm"),
+        ("arm", {"joints": "many"}, "joints is 'many', but must be a whole number"),
         ("arm", {"repeats": 3}, "arm has nothing random without noise"),
         ("arm", {"noise": "wind:1"}, "noise is 'wind:1'"),
         ("arm", {"noise": "action:1", "repeats": 0}, "repeats is 0"),

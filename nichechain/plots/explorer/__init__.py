@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from nichechain.arguments import check_whole
 from nichechain.chain.displacement import GridDisplacement
 from nichechain.chain.draws import transition_draws
 from nichechain.chain.graph import LONG_JUMP
@@ -186,6 +187,7 @@ def explorer_page(
         raise NichechainError(f"l is {l}, but the page goes up to {LONGEST} generations")
     if lineages > _MOST_LINEAGES:
         raise NichechainError(f"lineages is {lineages}, but the page goes up to {_MOST_LINEAGES}")
+    check_whole(draws=draws)
     if draws < 1:
         raise NichechainError(f"draws is {draws}, but at least 1 is needed")
     axes = len(archive.meta.facts.behavior_names)

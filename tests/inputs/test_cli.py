@@ -1,0 +1,447 @@
+"""Bad values of every option of every command: exit 2, one sentence, nothing on standard output."""
+
+# every row of a table takes the world, whether it needs it or not
+
+from __future__ import annotations
+
+import dataclasses
+import importlib
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from nichechain import NichechainError
+from nichechain.cli import COMMANDS, main
+
+from .table import World, check_sentence
+
+# Words that are no numbers, and numbers that are none of ours, by what an option takes.
+_COUNT = ("0", "-1", "1.5", "three", "nan", "")
+_NATURAL = ("-1", "1.5", "three", "nan", "")
+_REAL = ("three", "")
+_POSITIVE = ("0", "-1", "nan", "inf", *_REAL)
+_SHARE = ("-0.1", "1.1", "nan", *_REAL)
+_UNKNOWN = ("no-such-thing", "3", "")
+_WORKERS = ("0", "-1", "three", "threads:0", "processes:x", "ray:x")
+_NICHE = ("9,9", "-1", "a", "0,", "0;0", "1,2,3", "999", "")
+_GRID = ("0x2", "2", "axb", "2x", "-1x2", "1000000x1000000", "2x2x2", "")
+_BOUNDS = ("0,1", "1,0,0,1", "0,nan,0,1", "a,b,c,d", "0,1,0", "")
+_PATH = ("/no/such/folder", "no-such-archive")
+_SCORES = {"l": _COUNT, "lineages": _COUNT, "seed": _NATURAL}
+_ESTIMATOR = {"estimator": _UNKNOWN}
+
+Bad = Mapping[str, Sequence[str]]
+
+_WALKS: dict[str, Sequence[str]] = {
+    "domain": _UNKNOWN,
+    "out": ("{archive}/meta.json",),
+    "runs": _COUNT,
+    "offspring": _COUNT,
+    "mutation": _UNKNOWN,
+    "scale": _POSITIVE,
+    "step_bound": ("rescaled", "rescaled:0", "no-such-kind:1", "rescaled:x"),
+    "k": _COUNT,
+    "archive_limit": _COUNT,
+    "archive_scope": _UNKNOWN,
+    "initialisation": ("no-such-thing", "normal:0", "normal:x", "orthogonal", "elites:/no/such/folder"),
+    "grid": _GRID,
+    "bounds": _BOUNDS,
+    "seed": _NATURAL,
+    "domain_seed": _NATURAL,
+    "options": ("joints", "joints=0", "no_such_option=3", "=3"),
+    "steps": _NATURAL,
+    "workers": _WORKERS,
+}
+_LEVEL = ("no-such-thing", "2", "0", "-0.5", "nan")
+_KDE = {"bandwidth": _POSITIVE, "mode": _UNKNOWN, "decay": ("0", "1.1", "nan", *_REAL)}
+
+TABLE: tuple[tuple[str, str, tuple[str, ...], Bad], ...] = (
+    (
+        "build",
+        "Build",
+        ("arm", "--evaluations", "20", "--initial", "5", "--grid", "2x2", "--out", "{fresh}"),
+        {
+            "domain": ("no-such-thing", "3", "gym:", "gym:NoSuch-v0"),
+            "evaluations": _COUNT,
+            "grid": _GRID,
+            "niches": ("cvt:0", "cvt", "cvt:x", "400", "voronoi:4"),
+            "niches_seed": _NATURAL,
+            "bounds": _BOUNDS,
+            "initial": _COUNT,
+            "batch": _COUNT,
+            "mutation": _UNKNOWN,
+            "scale": _POSITIVE,
+            "df": (*_POSITIVE, "3"),
+            "step_bound": ("rescaled", "rescaled:0", "no-such-kind:1", "rescaled:x", "rescaled:nan"),
+            "layer_scales": ("0", "a", "1,nan", "1,1", ""),
+            "selection": _UNKNOWN,
+            "replacement": _UNKNOWN,
+            "outside": _UNKNOWN,
+            "seed": _NATURAL,
+            "domain_seed": _NATURAL,
+            "descriptor": ("final-xy",),
+            "controller": ("mlp:4", "lstm"),
+            "steps": ("0", "three", "5"),
+            "noise": ("action", "action:x", "action:-1", "wind:1"),
+            "repeats": _COUNT,
+            "options": ("joints", "joints=0", "no_such_option=3", "=3", "joints=1.5"),
+            "workers": _WORKERS,
+            "max_failed": _SHARE,
+            "out": ("{archive}", "{archive}/meta.json"),
+        },
+    ),
+    (
+        "compare",
+        "Compare",
+        ("{archive}", "{archive}", "--resamples", "2"),
+        {
+            "first": _PATH,
+            "second": (*_PATH, "{other}"),
+            "min_births": (*_NATURAL, "10000"),
+            "resamples": ("1", *_COUNT),
+            "draws": _COUNT,
+            "format": _UNKNOWN,
+            **_SCORES,
+        },
+    ),
+    ("domains", "Domains", (), {}),
+    (
+        "estimate",
+        "Estimate",
+        ("{archive}",),
+        {
+            "path": _PATH,
+            "estimator": _UNKNOWN,
+            "min_births": _NATURAL,
+            "seed": _NATURAL,
+            "format": _UNKNOWN,
+            # Without --compare and --stability these are nobody's.
+            "folds": ("5",),
+            "thin": ("birth", *_UNKNOWN),
+            "repeats": ("3",),
+            "out": ("file.png",),
+        },
+    ),
+    (
+        "estimate",
+        "Estimate",
+        ("{archive}", "--compare"),
+        {"folds": ("1", *_COUNT, "100000"), "seed": ("-1",)},
+    ),
+    (
+        "estimate",
+        "Estimate",
+        ("{archive}", "--stability", "--repeats", "1"),
+        {"repeats": _COUNT, "min_births": ("100000",), "out": ("file.txt", "/no/such/folder/file.png")},
+    ),
+    (
+        "evolvability",
+        "Evolvability",
+        ("{archive}", "--draws", "2"),
+        {
+            "path": _PATH,
+            "niche": _NICHE,
+            "elite": _NICHE,
+            "top": _COUNT,
+            "method": _UNKNOWN,
+            "convention": _UNKNOWN,
+            "estimator": _UNKNOWN,
+            "unvisited": ("self", *_UNKNOWN),
+            "offspring": _COUNT,
+            "min_births": _NATURAL,
+            "draws": _COUNT,
+            "uncertainty": _UNKNOWN,
+            "repeats": _COUNT,
+            "format": _UNKNOWN,
+            **_SCORES,
+        },
+    ),
+    ("evolvability", "Evolvability", ("{archive}", "--elite", "{niche}"), {"workers": _WORKERS}),
+    (
+        "explore",
+        "Explore",
+        ("{archive}", "--out", "{fresh}"),
+        {
+            "path": _PATH,
+            "out": ("/no/such/folder/page.html", "{archive}"),
+            "draws": _COUNT,
+            **_SCORES,
+            **_ESTIMATOR,
+        },
+    ),
+    (
+        "import",
+        "Import",
+        ("{log}", "--grid", "3x2", "--bounds", "0,1,0,1", "--out", "{fresh}"),
+        {
+            "log": ("/no/such/log.csv", "{archive}/meta.json", "{archive}"),
+            "grid": _GRID,
+            "bounds": _BOUNDS,
+            "out": ("{archive}",),
+            "outside": _UNKNOWN,
+            **dict.fromkeys(
+                ("parent", "child", "run", "uid", "elite", "step", "child_behavior", "parent_behavior"),
+                ("no_such_column",),
+            ),
+            "names": ("x", "x,y,z"),
+        },
+    ),
+    ("info", "Info", ("{archive}",), {"path": _PATH, "format": _UNKNOWN}),
+    (
+        "landscape",
+        "LandscapeCommand",
+        ("{archive}", "--offspring", "2", "--elites", "1", "--out", "{fresh}.csv"),
+        {
+            "path": _PATH,
+            "offspring": ("1", *_COUNT),
+            "mutation": _UNKNOWN,
+            "scale": _POSITIVE,
+            "step_bound": ("rescaled", "rescaled:0", "no-such-kind:1"),
+            "elites": _COUNT,
+            "share": ("0", *_SHARE),
+            "min_births": _NATURAL,
+            "top": _NATURAL,
+            "by": _UNKNOWN,
+            "map": ("no-such-thing", "ratio,no-such-thing", ""),
+            "workers": _WORKERS,
+            "out": ("/no/such/folder/table.csv", "{archive}"),
+            **_SCORES,
+        },
+    ),
+    (
+        "merge",
+        "Merge",
+        ("{archive}", "{again}", "--out", "{fresh}"),
+        {"paths": (*_PATH, "{archive}", "{other}"), "out": ("{archive}",)},
+    ),
+    (
+        "plot",
+        "Plot",
+        ("{archive}", "reach", "--niche", "{niche}", "--out", "{fresh}.png"),
+        {
+            "path": _PATH,
+            "kind": _UNKNOWN,
+            "out": ("file.txt", "/no/such/folder/file.png", "file"),
+            "l": _COUNT,
+            "lineages": _COUNT,
+            "niche": _NICHE,
+            "dpi": ("0", "9", "2001", "-5", "1.5", "three"),
+            **_ESTIMATOR,
+        },
+    ),
+    (
+        "plot",
+        "Plot",
+        ("{archive}", "reachability", "--out", "{fresh}.png"),
+        {"threshold": ("-0.1", "1.1", "nan", *_REAL), "niche": ("0,0",)},
+    ),
+    (
+        "plot",
+        "Plot",
+        ("{archive}", "evolvability", "--out", "{fresh}.png"),
+        {"min_births": _NATURAL, "threshold": ("0.5",)},
+    ),
+    (
+        "sweep",
+        "Sweep",
+        ("{archive}", "--sizes", "2", "--draws", "2"),
+        {
+            "path": _PATH,
+            "sizes": ("0", "a", "2,-1", "2.5", "1000000", ""),
+            "behavior": ("0", "9,9", "a,b", "nan,0", "0,0,0"),
+            "min_births": _NATURAL,
+            "draws": _COUNT,
+            "out": ("file.txt", "/no/such/folder/file.png"),
+            **_SCORES,
+        },
+    ),
+    (
+        "validate",
+        "Validate",
+        ("{archive}", "--out", "{fresh}", "--elites", "3", "--lineages", "1", "--permutations", "9"),
+        {
+            "path": _PATH,
+            "elites": ("2", *_COUNT),
+            "permutations": _COUNT,
+            "workers": _WORKERS,
+            "out": ("{archive}/meta.json",),
+            **_SCORES,
+        },
+    ),
+    (
+        "verify",
+        "Verify",
+        ("{archive}",),
+        {
+            "path": _PATH,
+            "sample": ("-1", "1.5", "some", ""),
+            "seed": _NATURAL,
+            "workers": _WORKERS,
+        },
+    ),
+    (
+        "walks pressure",
+        "Pressure",
+        ("arm", "--out", "{fresh}", "--runs", "2", "--steps", "1", "--offspring", "2"),
+        {**_WALKS, "levels": (*_LEVEL, "selective,2", "selective,selective", ""), "metric": _UNKNOWN},
+    ),
+    (
+        "walks pressure",
+        "Pressure",
+        ("arm", "--out", "{fresh}", "--runs", "2", "--steps", "1", "--metric", "kde"),
+        _KDE,
+    ),
+    (
+        "walks metrics",
+        "Metrics",
+        ("arm", "--out", "{fresh}", "--runs", "2", "--steps", "1", "--offspring", "2"),
+        {**_WALKS, **_KDE, "metrics": ("no-such-thing", "knn,no-such-thing", "knn,knn", ""), "level": _LEVEL},
+    ),
+    (
+        "walks sensitivity",
+        "Sensitivity",
+        ("arm", "--out", "{fresh}", "--runs", "2", "--steps", "1", "--offspring", "2"),
+        {
+            **{name: values for name, values in _WALKS.items() if name != "scale"},
+            "vary": _UNKNOWN,
+            "level": _LEVEL,
+            "metric": _UNKNOWN,
+        },
+    ),
+    (
+        "walks sensitivity",
+        "Sensitivity",
+        ("arm", "--out", "{fresh}", "--vary", "k", "--metric", "kde", "--runs", "2", "--steps", "1"),
+        {**_KDE, "scale": _POSITIVE},
+    ),
+    ("walks resume", "Resume", ("{study}",), {"path": _PATH, "runs": _COUNT, "workers": _WORKERS}),
+    ("walks report", "Report", ("{study}",), {"path": _PATH}),
+)
+
+# What has no bad value: flags, and texts that may be anything.
+FREE = {
+    "unit": "any text",
+    **dict.fromkeys(
+        (
+            "compare",
+            "force",
+            "json",
+            "lowest",
+            "other_niche",
+            "paired",
+            "resume",
+            "self_adaptive",
+            "speed",
+            "stability",
+            "strict",
+        ),
+        "a flag",
+    ),
+}
+
+
+def _rows() -> list[Any]:
+    return [
+        pytest.param(command, kind, given, option, value, id=f"{command} {option} {value!r}")
+        for command, kind, given, bad in TABLE
+        for option, values in bad.items()
+        for value in dict.fromkeys(values)
+    ]
+
+
+def _dataclass(command: str, kind: str) -> Any:
+    name = command.split()[0]
+    return getattr(importlib.import_module(f"nichechain.cli.{name}{'_' * (name == 'import')}"), kind)
+
+
+def _words(command: str, kind: str, given: Sequence[str], option: str, value: str) -> list[str]:
+    """The command line with this value for the option, or for the positional argument of that name."""
+    fields = [field.name for field in dataclasses.fields(_dataclass(command, kind))]
+    positional = list(_POSITIONAL.get(command, ("path",)))
+    words = list(given)
+    if option in positional:
+        words[positional.index(option)] = value
+        return [*command.split(), *words]
+    assert option in fields
+    name = f"--{option.replace('_', '-')}"
+    if name in words:
+        at = words.index(name)
+        del words[at : at + 2]
+    # Values that begin with a dash are values all the same.
+    return [*command.split(), *words, f"{name}={value}" if value.startswith("-") else name, *_one(value)]
+
+
+def _one(value: str) -> list[str]:
+    return [] if value.startswith("-") else [value]
+
+
+_POSITIONAL = {
+    "build": ("domain",),
+    "compare": ("first", "second"),
+    "domains": (),
+    "import": ("log",),
+    "merge": ("first", "paths"),
+    "plot": ("path", "kind"),
+    "walks pressure": ("domain",),
+    "walks metrics": ("domain",),
+    "walks sensitivity": ("domain",),
+}
+
+
+def _filled(words: Sequence[str], world: World) -> list[str]:
+    places = {
+        "archive": world.archive.folder,
+        "again": world.again,
+        "other": world.other,
+        "log": world.log,
+        "study": world.study,
+        "fresh": world.fresh(),
+        "niche": ",".join(map(str, world.elite.niche)),
+    }
+    return [word.format(**places) if "{" in word else word for word in words]
+
+
+@pytest.mark.parametrize(("command", "kind", "given", "option", "value"), _rows())
+def test_a_bad_value_ends_in_one_sentence(
+    command: str,
+    kind: str,
+    given: tuple[str, ...],
+    option: str,
+    value: str,
+    world: World,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    words = _filled(_words(command, kind, given, option, value), world)
+    try:
+        status = main(words)
+    except SystemExit as stopped:
+        # The parser of options refuses words that are no numbers, and unknown names, itself.
+        status = stopped.code
+        said = capsys.readouterr()
+        assert (status, said.out) == (2, "")
+        assert value in said.err or option.replace("_", "-") in said.err or option.upper() in said.err
+        assert "Traceback" not in said.err
+        return
+    said = capsys.readouterr()
+    assert (status, said.out) == (2, ""), said
+    message = said.err.splitlines()[-1]
+    assert message.startswith("nichechain: error: ")
+    check_sentence(message)
+    assert "Traceback" not in said.err
+    with pytest.raises((NichechainError, OSError)):
+        main([*words, "--debug"])
+
+
+def test_every_option_of_every_command_is_in_the_table() -> None:
+    assert {command.split()[0] for command, *_ in TABLE} == set(COMMANDS)
+    tried: dict[Any, set[str]] = {}
+    for command, kind, _, bad in TABLE:
+        tried.setdefault(_dataclass(command, kind), set()).update(bad)
+    for kind, options in tried.items():
+        missing = {field.name for field in dataclasses.fields(kind)} - options - set(FREE)
+        assert not missing, f"{kind.__name__}: no bad value is tried of {', '.join(sorted(missing))}"

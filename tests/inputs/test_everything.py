@@ -1,0 +1,246 @@
+"""Nothing public goes untried: every parameter of every public function is in a table of bad input."""
+
+# every row of a table takes the world, whether it needs it or not
+
+from __future__ import annotations
+
+import importlib
+import inspect
+import pkgutil
+import re
+from collections.abc import Iterator
+from typing import Any
+
+import nichechain
+
+from . import (
+    test_chain,
+    test_domains,
+    test_evolvability,
+    test_experiments,
+    test_files,
+    test_landscape,
+    test_plots,
+    test_walks,
+)
+from .table import Call
+
+CALLS: tuple[Call, ...] = sum(
+    (
+        module.CALLS
+        for module in (
+            test_chain,
+            test_domains,
+            test_evolvability,
+            test_experiments,
+            test_files,
+            test_landscape,
+            test_plots,
+            test_walks,
+        )
+    ),
+    (),
+)
+
+# Modules without a list of names, whose functions are for users all the same.
+_OPEN = (
+    "chain.analysis",
+    "chain.comparison",
+    "chain.contrast",
+    "chain.filters",
+    "chain.graph",
+    "chain.passage",
+    "chain.sampling",
+    "chain.stability",
+    "chain.wormholes",
+    "coverage",
+    "exports",
+    "importing",
+    "merging",
+    "polynomial",
+    "reach",
+    "selection",
+    "sweep",
+    "visits",
+)
+
+
+def _public() -> dict[str, Any]:
+    """Functions and classes that are for users, by where they were defined."""
+    found: dict[str, Any] = {}
+    for module in sorted(info.name for info in pkgutil.walk_packages(nichechain.__path__, "nichechain.")):
+        if module.startswith(("nichechain.cli", "nichechain.engine", "nichechain.__main__")):
+            continue
+        loaded = importlib.import_module(module)
+        names = list(getattr(loaded, "__all__", ()))
+        if module.removeprefix("nichechain.") in _OPEN:
+            names += [
+                name
+                for name, value in vars(loaded).items()
+                if inspect.isfunction(value) and value.__module__ == module and name[0] != "_"
+            ]
+        for name in names:
+            value = getattr(loaded, name)
+            if inspect.isclass(value) or inspect.isfunction(value):
+                found[f"{value.__module__}.{value.__qualname__}"] = value
+    return found
+
+
+def _untried() -> Iterator[tuple[str, str]]:
+    tried: dict[Any, set[str]] = {}
+    for call in CALLS:
+        tried.setdefault(call.function, set()).update(call.bad)
+    for name, value in _public().items():
+        if getattr(value, "_is_protocol", False) or name.rpartition(".")[2] in RESULTS:
+            continue
+        for parameter in inspect.signature(value).parameters.values():
+            kinds = set(re.findall(r"[A-Za-z_.]+", str(parameter.annotation)))
+            if parameter.name not in tried.get(value, ()) and not kinds <= OBJECTS:
+                yield name, parameter.name
+
+
+# What the package itself makes and types check: a wrong object is a mistake in a program, not a bad value.
+OBJECTS = {
+    "Any",
+    "Archive",
+    "ArchiveRule",
+    "Axes",
+    "Bound",
+    "BuildConfig",
+    "Callable",
+    "Condition",
+    "DirectCheck",
+    "Domain",
+    "Elite",
+    "Evaluation",
+    "Executor",
+    "Landscape",
+    "LinearMap",
+    "Lineages",
+    "Matrix",
+    "Metric",
+    "Mutation",
+    "NicheChain",
+    "NicheEvolvability",
+    "Niches",
+    "Noise",
+    "None",
+    "OnDone",
+    "Progress",
+    "RankStability",
+    "Reach",
+    "SearchState",
+    "Selection",
+    "Study",
+    "Sweep",
+    "Transition",
+    "TransitionCounts",
+    "Triples",
+    "ValidationConfig",
+    "WalkConfig",
+    "WalkState",
+    "bool",
+    "np.random.Generator",
+    "nx.DiGraph",
+}
+
+# Made by functions that check, and read by users.
+RESULTS = {
+    "Check",
+    "Correlation",
+    "Difference",
+    "DirectCheck",
+    "Dissimila",
+    "Episode",
+    "Evaluation",
+    "Evolvability",
+    "Landscape",
+    "LandscapeMeasures",
+    "Lineages",
+    "MarkovTest",
+    "Measure",
+    "Measures",
+    "NicheBand",
+    "NicheEvolvability",
+    "NoveltyArchive",
+    "Prediction",
+    "Progress",
+    "Step",
+    "StepRecord",
+    "Surroundings",
+    "TransitionCounts",
+    "Triples",
+    "Validation",
+    "Verification",
+    "WalkResult",
+    "WalkState",
+}
+
+_TEXT = "a text for people, which may be anything"
+_CHECKED = "a check itself: its callers are in the tables"
+_WITHIN = "called by this package with what it has checked"
+_LATER = "opened or made when it is needed, where a command's table tries it"
+
+EXEMPT: dict[tuple[str, str], str] = {
+    (f"nichechain.{name}", parameter): reason
+    for name, parameters, reason in (
+        ("chain.model.NicheChain", "estimator", _TEXT),
+        ("domains.gym.GymDomain", "unit", _TEXT),
+        ("experiments.conditions.condition_seed", "label", _TEXT),
+        ("importing.write_archive", "objective_name", _TEXT),
+        ("niches.parsing.parse_niche", "option", _TEXT),
+        ("plots.walks.draw_study", "unit title", _TEXT),
+        ("plots.walks.plot_runs", "unit", _TEXT),
+        ("plots.walks.plot_walks", "unit", _TEXT),
+        ("pyribs.conversion.from_ribs", "objective_name", _TEXT),
+        ("coverage.check_lengths", "generations lineages", _CHECKED),
+        ("reach.check_draws", "convention draws", _CHECKED),
+        ("chain.comparison.counts_of_families", "families", _WITHIN),
+        ("chain.comparison.probability_of", "parent child", _WITHIN),
+        ("coverage.visit_probabilities", "generations counted columns", _WITHIN),
+        ("coverage.sampled_coverage", "first", _WITHIN),
+        ("execution.base.evaluate_rows", "genotypes", _WITHIN),
+        ("experiments.running.run", "on_progress", _WITHIN),
+        ("importing.write_archive", "folder rows origin", _WITHIN),
+        ("landscape.archives.measure_archive", "on_done", _WITHIN),
+        ("niches.making.make", "centroids", _WITHIN),
+        ("plots.wormholes.plot_wormholes", "found", _WITHIN),
+        ("reach.visit_probability", "first steps", _WITHIN),
+        ("selection.draw_curious", "scores size", _WITHIN),
+        ("sweep.default_sizes", "axes", _WITHIN),
+        ("validation.rollouts.sample_roots", "filled", _WITHIN),
+        ("walks.state.record_table", "records", _WITHIN),
+        (
+            "domains.registry.make",
+            "options",
+            "tried one by one: joints, noise, repeats, and one that is not there",
+        ),
+        ("execution.ray.Ray", "address", _LATER),
+        ("experiments.running.is_study", "folder", "asks whether there is one: any path has an answer"),
+        ("experiments.running.run", "folder", _LATER),
+        ("experiments.studies.Study", "domain domain_options", _LATER),
+        ("landscape.archives.measure_archive", "keep", _LATER),
+        ("plots.explorer.write_explorer", "out", _LATER),
+        (
+            "pyribs.recording.Recording",
+            "emitters outside strategy_parent",
+            "what record() hands on, which is tried",
+        ),
+        (
+            "pyribs.conversion.from_ribs",
+            "folder",
+            "tests/pyribs/test_conversion.py, where there are archives of pyribs",
+        ),
+    )
+    for parameter in parameters.split()
+}
+
+
+def test_every_parameter_of_every_public_function_is_tried() -> None:
+    missing = [f"{name}: {parameter}" for name, parameter in _untried() if (name, parameter) not in EXEMPT]
+    assert not missing, "no bad value is tried of " + "; ".join(missing)
+
+
+def test_every_exemption_is_of_something() -> None:
+    """What is gone, or has a table by now, is no exemption."""
+    assert set(EXEMPT) <= set(_untried())

@@ -1,0 +1,265 @@
+"""Bad input of what reads and writes files: archives, builds, merges, logs, exports; and of executors."""
+
+# ruff: noqa: ARG005  # every row of a table takes the world, whether it needs it or not
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+import pytest
+
+from nichechain.importing import Axes, Columns
+
+from .table import (
+    LINEAGES,
+    NOT_A_NUMBER,
+    RAGGED,
+    SEED,
+    SHARE,
+    UNKNOWN,
+    Call,
+    Made,
+    World,
+    check_accepted,
+    check_refused,
+    rows,
+    whole,
+)
+
+_NO_FOLDER = ("/no/such/folder", "no-such-archive")
+_GONE = Made(lambda w: w.folder / "gone" / "file", "no-folder")
+
+
+def _without(column: str) -> Made:
+    return Made(lambda w: w.births.drop(columns=[column]), f"no-{column}")
+
+
+def _written(name: str, content: str) -> Made:
+    def write(w: World) -> Any:
+        path = w.folder / name
+        path.write_text(content)
+        return path
+
+    return Made(write, name)
+
+
+def _configs(*changes: dict[str, Any]) -> tuple[Made, ...]:
+    return tuple(
+        Made(lambda w, change=change: dataclasses.replace(w.config, **change), str(change))
+        for change in changes
+    )
+
+
+_ORPHAN = Made(lambda w: w.births.assign(parent_uid=w.births["parent_uid"].fillna(0) + 10_000), "orphans")
+
+CALLS = (
+    Call("load", lambda w: {"path": w.archive.folder}, {"path": (*_NO_FOLDER, "")}),
+    Call(
+        "Archive.elite",
+        lambda w: {"self": w.archive, "niche": w.elite.niche},
+        {"niche": (-1, 25, (9, 9), "0")},
+    ),
+    Call(
+        "Archive.counts_of",
+        lambda w: {"self": w.archive},
+        {"run": (-1, 99, "first"), "steps": ((3, 1), (-1, 2), (1,), "all")},
+    ),
+    Call("Archive.chain", lambda w: {"self": w.archive}, {"estimator": UNKNOWN}),
+    Call(
+        "BuildConfig",
+        lambda w: {"domain": "arm", "shape": (3, 2), "bounds": ((0, 1), (0, 1))},
+        {
+            "shape": (("a", 2), 3, None, (2.5, 2)),
+            "bounds": ("0,1", ((0,), (1,)), None),
+            "evaluations": whole(0),
+            "initial": whole(0),
+            "batch": whole(0),
+            "scale": ("three", None),
+            "replacement": UNKNOWN,
+            "seed": SEED,
+            "domain_seed": SEED,
+            "niches": UNKNOWN,
+            "niches_seed": SEED,
+            "domain_options": ("joints=3", {3: 3}, {"joints": None}, {"joints": np.nan}),
+            "df": ("three",),
+            "step_bound": ("rescaled", ("rescaled", "a"), ("rescaled",)),
+            "layer_scales": (("a",),),
+            "selection": UNKNOWN,
+        },
+    ),
+    Call(
+        "niches.check",
+        lambda w: {"config": w.config},
+        {
+            "config": _configs(
+                {"shape": (0, 2)},
+                {"shape": (10**6, 10**6)},
+                {"bounds": ((1, 0), (0, 1))},
+                {"bounds": ((0, np.nan), (0, 1))},
+                {"outside": "elsewhere"},
+                {"niches": "cvt", "shape": (3,), "outside": "elsewhere"},
+            )
+        },
+    ),
+    Call(
+        "variation.configured",
+        lambda w: {"config": w.config, "domain": w.arm},
+        {
+            "config": _configs(
+                {"mutation": "no-such-mutation"},
+                {"scale": 0.0},
+                {"scale": -1.0},
+                {"scale": np.inf},
+                {"scale": np.nan},
+                {"df": 3.0},
+                {"mutation": "student-t", "df": 0.0},
+                {"step_bound": ("no-such-kind", 1.0)},
+                {"step_bound": ("rescaled", 0.0)},
+                {"layer_scales": (0.0,)},
+                {"layer_scales": (1.0, 2.0, 3.0)},
+            )
+        },
+    ),
+    Call(
+        "build",
+        lambda w: {"config": w.config, "folder": w.archive.folder, "executor": w.here},
+        {
+            "config": (Made(lambda w: w.other_config, "other-config"),),
+            "folder": (_written("a-file", ""),),
+            "max_failed": SHARE,
+        },
+    ),
+    Call(
+        "merging.merge",
+        lambda w: {"folders": (w.archive.folder, w.again), "out": w.fresh()},
+        {
+            "folders": (
+                (),
+                Made(lambda w: (w.archive.folder,), "one"),
+                Made(lambda w: (w.archive.folder, w.archive.folder), "itself"),
+                Made(lambda w: (w.archive.folder, w.other), "other-niches"),
+                _NO_FOLDER,
+            ),
+            "out": (Made(lambda w: w.archive.folder, "an-archive"),),
+        },
+    ),
+    Call(
+        "importing.import_births",
+        lambda w: {"log": w.log, "folder": w.fresh(), "niches": w.niches},
+        {
+            "log": (
+                "/no/such/log.csv",
+                _written("log.txt", ""),
+                _written("empty.csv", ""),
+                _written("header.csv", "parent_niche,child_niche\n"),
+                _written("short.csv", "parent_niche\n1\n"),
+                _written("words.csv", "parent_niche,child_niche\na,b\n"),
+                _written("negative.csv", "parent_niche,child_niche\n-3,1\n"),
+                _written("half.csv", "parent_niche,child_niche\n0.5,1\n"),
+                _written("huge.csv", "parent_niche,child_niche\n99,1\n"),
+                _written("bad.parquet", "PAR1"),
+            ),
+            "folder": (Made(lambda w: w.archive.folder, "an-archive"),),
+            "columns": (Columns(parent="no-such-column"),),
+            "axes": (Axes(names=("x",)),),
+        },
+    ),
+    *(
+        Call(
+            f"exports.{name}",
+            lambda w: {"graph": w.archive.chain().graph(0.1), "path": w.folder / "graph"},
+            {"path": (_GONE,)},
+        )
+        for name in ("write_graphml", "write_gexf", "write_dot", "write_edges")
+    ),
+    Call(
+        "exports.write_stn",
+        lambda w: {"births": w.births, "niches": w.archive.niches, "path": w.folder / "stn.csv"},
+        {
+            "births": (_without("run"), _without("objective")),
+            "niches": (Made(lambda w: w.niches, "other-niches"),),
+            "path": (_GONE,),
+        },
+    ),
+    Call(
+        "exports.write_phylogeny",
+        lambda w: {"births": w.births, "niches": w.archive.niches, "path": w.folder / "tree.csv"},
+        {
+            "births": (_without("uid"), _ORPHAN),
+            "niches": (Made(lambda w: w.niches, "other-niches"),),
+            "path": (_GONE,),
+        },
+    ),
+    Call("exports.genealogy", lambda w: {"births": w.births}, {"births": (_without("uid"), _ORPHAN)}),
+    Call(
+        "exports.write_genealogy",
+        lambda w: {"births": w.births, "path": w.folder / "pairs.csv"},
+        {"births": (_without("parent_uid"), _ORPHAN), "path": (_GONE,)},
+    ),
+    Call(
+        "selection.curiosity",
+        lambda w: {"births": w.births},
+        {
+            "births": (
+                _without("accepted"),
+                Made(lambda w: w.births.assign(accepted=None), "accepted-unknown"),
+            ),
+            "by": UNKNOWN,
+        },
+    ),
+    Call(
+        "sweep.sweep",
+        lambda w: {"archive": w.archive, "sizes": (2,), "draws": 1},
+        {
+            "sizes": ((), (0,), (-1,), (2.5,), ("a",), ((2,),), (10**6,)),
+            "behavior": ((0.0,), (9.0, 9.0), (np.nan, 0.0), *RAGGED),
+            "min_births": ("three", np.nan),
+            "draws": whole(0),
+            "folds": whole(1),
+            **LINEAGES,
+        },
+    ),
+    Call(
+        "verification.verify",
+        lambda w: {"archive": w.archive, "sample": 2, "executor": w.here},
+        {"archive": _NO_FOLDER, "sample": whole(-1), "seed": SEED},
+    ),
+    Call(
+        "execution.make",
+        lambda w: {"workers": "1"},
+        {"workers": ("0", "-1", "threads:0", "threads:x", "processes:-1", "dask", "1.5", "ray:x", "three")},
+    ),
+    Call("execution.Threads", lambda w: {"workers": 1}, {"workers": whole(0)}),
+    Call("Threads", lambda w: {"workers": 1}, {"workers": (0,)}),
+    Call("execution.Processes", lambda w: {"workers": 1}, {"workers": whole(0)}),
+    Call(
+        "pyribs.record",
+        lambda w: {"scheduler": w.scheduler()},
+        {"outside": UNKNOWN, "strategy_parent": UNKNOWN},
+    ),
+    Call(
+        "pyribs.MutationEmitter",
+        lambda w: {
+            "archive": w.scheduler().archive,
+            "mutate": w.mutate,
+            "initial_solutions": np.zeros((1, 3)),
+        },
+        {
+            "initial_solutions": (np.zeros(3), np.zeros((0, 3)), np.zeros((1, 2)), *RAGGED),
+            "batch_size": whole(0),
+            "seed": SEED,
+        },
+    ),
+    Call("failures.Failures", lambda w: {}, {"most": (-0.1, 1.1, *NOT_A_NUMBER)}),
+)
+
+
+@pytest.mark.parametrize(("call", "parameter", "value"), rows(*CALLS))
+def test_a_bad_value_is_refused_in_one_sentence(call: Call, parameter: str, value: Any, world: World) -> None:
+    check_refused(call, parameter, value, world)
+
+
+@pytest.mark.parametrize("call", CALLS, ids=lambda call: call.name)
+def test_the_other_arguments_are_good(call: Call, world: World) -> None:
+    check_accepted(call, world)

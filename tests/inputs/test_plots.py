@@ -1,0 +1,107 @@
+"""Bad input of figures and of the explorer."""
+
+# every row of a table takes the world, whether it needs it or not
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from .table import (
+    LINEAGES,
+    NOT_A_NUMBER,
+    SHARE,
+    UNKNOWN,
+    Call,
+    Made,
+    World,
+    check_accepted,
+    check_refused,
+    rows,
+    whole,
+)
+
+_THRESHOLD = (-0.1, 1.5, *NOT_A_NUMBER)
+_NO_NICHES = ([], list(range(20)), [99], [(9, 9)])
+_WALKS = {"measure": UNKNOWN, "conditions": (["no-such-condition"],)}
+
+
+def _no_runs(w: World) -> Any:
+    return w.records.iloc[:0]
+
+
+_EMPTY = (Made(_no_runs, "no-runs"),)
+
+CALLS = (
+    Call(
+        "plots.plot_generations",
+        lambda w: {"chain": w.chain, "ax": w.axes(), "niches": [0], "lineages": 2, "longest": 2, "draws": 1},
+        {
+            "niches": _NO_NICHES,
+            "lineages": whole(0),
+            "longest": whole(0),
+            "draws": whole(0),
+            "seed": LINEAGES["seed"],
+        },
+    ),
+    Call(
+        "plots.plot_lineages",
+        lambda w: {"chain": w.chain, "ax": w.axes(), "niches": [0], "l": 2, "most": 10, "draws": 1},
+        {"niches": _NO_NICHES, "l": whole(0), "most": whole(1), "draws": whole(0), "seed": LINEAGES["seed"]},
+    ),
+    Call(
+        "plots.plot_reachability",
+        lambda w: {"archive": w.archive, "chain": w.chain, "ax": w.axes()},
+        {"threshold": SHARE},
+    ),
+    *(
+        Call(
+            f"plots.classes.{name}",
+            lambda w: {"archive": w.archive, "chain": w.archive.chain("mle"), "ax": w.axes()},
+            {"threshold": _THRESHOLD},
+        )
+        for name in ("plot_classes", "plot_transitions_by_class")
+    ),
+    Call(
+        "plots.plot_evolvability",
+        lambda w: {"archive": w.archive, "scores": w.archive_scores, "ax": w.axes()},
+        {"min_births": ("three", np.nan, 1.5)},
+    ),
+    Call(
+        "plots.plot_reach",
+        lambda w: {"archive": w.archive, "reach": w.reached, "ax": w.axes(), "niche": 0},
+        {"niche": (-1, 99, (9, 9), "0")},
+    ),
+    Call(
+        "plots.plot_calibration",
+        lambda w: {"check": w.check, "ax": w.axes(), "generation": 1},
+        {"generation": (*whole(0), 3)},
+    ),
+    Call("plots.plot_walks", lambda w: {"records": w.records, "ax": w.axes()}, {"records": _EMPTY, **_WALKS}),
+    Call(
+        "plots.plot_runs",
+        lambda w: {"records": w.records, "ax": w.axes(), "step": 0},
+        {"records": _EMPTY, "step": (-1, 99, "last"), **_WALKS},
+    ),
+    Call(
+        "plots.draw_study",
+        lambda w: {"records": w.records, "step": 0},
+        {"records": _EMPTY, "step": (-1, 99, "last"), "conditions": _WALKS["conditions"]},
+    ),
+    Call(
+        "plots.write_explorer",
+        lambda w: {"archive": w.archive, "chain": w.chain, "out": w.fresh(), "draws": 1},
+        {**LINEAGES, "l": (10_000, *whole(0)), "lineages": (10**9, *whole(0)), "draws": whole(0)},
+    ),
+)
+
+
+@pytest.mark.parametrize(("call", "parameter", "value"), rows(*CALLS))
+def test_a_bad_value_is_refused_in_one_sentence(call: Call, parameter: str, value: Any, world: World) -> None:
+    check_refused(call, parameter, value, world)
+
+
+@pytest.mark.parametrize("call", CALLS, ids=lambda call: call.name)
+def test_the_other_arguments_are_good(call: Call, world: World) -> None:
+    check_accepted(call, world)
