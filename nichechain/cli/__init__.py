@@ -74,6 +74,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         # Whoever read our output has had enough; Python must not try to flush the rest.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
+    except MemoryError as error:
+        if debug:
+            raise
+        return _fail(f"not enough memory: {error or 'ask for less'}")
     except OSError as error:
         if debug:
             raise

@@ -6,22 +6,12 @@ import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal, get_args
+from typing import TYPE_CHECKING, Annotated, Literal, TypeAlias
 
 import tyro
 
 from nichechain.cli import console
 from nichechain.errors import NichechainError
-from nichechain.experiments.conditions import Condition, MetricName, Mode
-from nichechain.experiments.studies import (
-    LEVELS,
-    METRICS,
-    Kind,
-    Study,
-    metric_conditions,
-    pressure_conditions,
-    variations,
-)
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -29,6 +19,12 @@ if TYPE_CHECKING:
     from nichechain.config import DomainOption
     from nichechain.domains import Domain
     from nichechain.experiments.analysis import Analysis
+    from nichechain.experiments.conditions import Condition
+    from nichechain.experiments.studies import Kind, Study
+
+# As in nichechain.experiments, which takes longer to import than help should.
+MetricName: TypeAlias = Literal["knn", "knn-no-archive", "parent", "ancestors", "kde"]
+Mode: TypeAlias = Literal["factor", "length"]
 
 _HELP = """usage: nichechain walks STUDY ...
 
@@ -59,30 +55,30 @@ class _Walks:
     """Folder of the study: walks, tables, figure and report."""
     runs: int = 50
     """Walks of each kind."""
-    offspring: int = Condition.offspring
+    offspring: int = 30
     """Children of a state in each step."""
-    mutation: str = Condition.mutation
+    mutation: str = "cauchy"
     """Mutation operator: cauchy, gaussian, student-t or uniform-ball."""
-    scale: float = Condition.scale
+    scale: float = 1.0
     """Scale of the mutation."""
     step_bound: Annotated[str | None, console.option("KIND:SIZE", "unbounded")] = None
     """How far a child can be from its parent: per-coordinate:2 truncates the noise on every weight,
     rescaled:50 shortens a step that is longer."""
-    k: int = Condition.k
+    k: int = 15
     """Neighbours of the kNN metrics."""
-    bandwidth: float = Condition.bandwidth
+    bandwidth: float = 0.5
     """Smoothing parameter of the KDE metric."""
-    mode: Mode = Condition.mode
+    mode: Mode = "factor"
     """What it multiplies: the covariance of the behaviors, or nothing (a length in units of behavior)."""
-    decay: float = Condition.decay
+    decay: float = 1.0
     """Discount of the KDE metric by age, a factor per step."""
-    archive_limit: int = Condition.archive_limit
+    archive_limit: int = 1200
     """Behaviors that a novelty archive holds at most."""
-    archive_scope: Literal["walk", "configuration"] = Condition.archive_scope
+    archive_scope: Literal["walk", "configuration"] = "walk"
     """Whether each walk has a novelty archive of its own, or all of a kind share one."""
     other_niche: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
     """Only a child in another niche than its parent may follow."""
-    initialisation: str = Condition.initialisation
+    initialisation: str = "domain"
     """First genotypes: domain, domain:S, normal:S, uniform:S, xavier-normal, ..., or elites:PATH."""
     grid: Annotated[str, tyro.conf.arg(metavar="NXxNY")] = "20x20"
     """Cells of the grid that coverage is measured on."""
@@ -99,20 +95,19 @@ class _Walks:
     workers: Annotated[str | None, console.option("WORKERS", "one thread per processor")] = None
     """Who evaluates: a number of threads, processes:N, ray or ray://HOST:PORT. The result is the same."""
 
-    def base(self, metric: MetricName = "knn") -> Condition:
+    def base(self) -> Condition:
         """What all conditions share."""
-        shared = {field.name: getattr(self, field.name) for field in fields(self) if field.name in _SHARED}
-        return Condition(label="base", metric=metric, **shared)
+        from nichechain.experiments.conditions import Condition
 
-
-_SHARED = {field.name for field in fields(Condition)} - {"label", "level", "metric"}
+        names = {field.name for field in fields(Condition)} & {field.name for field in fields(self)}
+        return Condition(label="base", **{name: getattr(self, name) for name in names})
 
 
 @dataclass(frozen=True)
 class Pressure(_Walks):
     """Walks under rising evolutionary pressure, from random to highly selective."""
 
-    levels: str = ",".join(LEVELS)
+    levels: str = "selective,0.1,0.25,0.5,0.75,random"
     """Levels of pressure: selective, random, and the best share of the offspring that may follow."""
     steps: int = 50
     """Steps T of a walk, of T + 1 states."""
@@ -121,14 +116,16 @@ class Pressure(_Walks):
 
     def conditions(self) -> tuple[Condition, ...]:
         """One for each level."""
-        return pressure_conditions(_words(self.levels), self.base(self.metric))
+        from nichechain.experiments.studies import pressure_conditions
+
+        return pressure_conditions(_words(self.levels), self.base())
 
 
 @dataclass(frozen=True)
 class Metrics(_Walks):
     """Highly selective walks, each kind selecting for another diversity metric."""
 
-    metrics: str = ",".join(METRICS)
+    metrics: str = "kde,knn,knn-no-archive,ancestors,parent"
     """Diversity metrics."""
     steps: int = 100
     """Steps T of a walk, of T + 1 states."""
@@ -137,7 +134,9 @@ class Metrics(_Walks):
 
     def conditions(self) -> tuple[Condition, ...]:
         """One for each metric."""
-        return metric_conditions(_words(self.metrics), replace(self.base(), level=self.level))
+        from nichechain.experiments.studies import metric_conditions
+
+        return metric_conditions(_words(self.metrics), self.base())
 
 
 @dataclass(frozen=True)
@@ -155,7 +154,9 @@ class Sensitivity(_Walks):
 
     def conditions(self) -> tuple[Condition, ...]:
         """One for each value."""
-        return variations(self.vary, replace(self.base(self.metric), level=self.level))
+        from nichechain.experiments.studies import variations
+
+        return variations(self.vary, self.base())
 
 
 @dataclass(frozen=True)
@@ -195,7 +196,7 @@ def run(arguments: Sequence[str]) -> int:
     if verb == "sensitivity":
         return _begin(console.parse(Sensitivity, rest, name="walks sensitivity"), "sensitivity")
     raise NichechainError(
-        f"there is no study {verb!r}: it must be one of {', '.join(get_args(Kind))}, resume or report"
+        f"there is no study {verb!r}: it must be one of pressure, metrics, sensitivity, resume or report"
     )
 
 
@@ -282,6 +283,7 @@ def _means(analysis: Analysis, unit: str) -> Table:
 def command_of(study: Study, folder: Path) -> str:
     """The command line that asks for a study."""
     from nichechain.cli.build import domain_option_text
+    from nichechain.experiments.conditions import Condition
     from nichechain.experiments.studies import LEVELS, METRICS, VARIATIONS
 
     base = study.conditions[0]
@@ -325,6 +327,7 @@ def _study(
     command: Pressure | Metrics | Sensitivity, kind: Kind, domain: Domain, options: Mapping[str, DomainOption]
 ) -> Study:
     """What is asked for, checked."""
+    from nichechain.experiments.studies import Study
     from nichechain.niches import parse_bounds, parse_shape
 
     shape = parse_shape(command.grid)

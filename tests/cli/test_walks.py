@@ -4,12 +4,26 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
+from typing import get_args
 
 import pyarrow.parquet as pq
 import pytest
 
 from nichechain.cli import main
-from nichechain.experiments import read_records, read_study
+from nichechain.cli.walks import MetricName, Metrics, Mode, Pressure, Sensitivity
+from nichechain.experiments import (
+    LEVELS,
+    METRICS,
+    VARIATIONS,
+    Condition,
+    conditions,
+    metric_conditions,
+    pressure_conditions,
+    read_records,
+    read_study,
+    variations,
+)
 from nichechain.experiments.report import FILES
 
 SMALL = ("--runs", "3", "--steps", "4", "--offspring", "6", "--workers", "1")
@@ -100,6 +114,17 @@ def test_interrupted(tmp_path):
     shown, _ = process.communicate(timeout=60)
     assert process.returncode == 130
     assert f"nichechain walks resume {tmp_path}" in shown
+
+
+def test_defaults_are_those_of_the_studies():
+    """The command line writes them out again, so that its help need not import the studies."""
+    out = Path("study")
+    assert Pressure("arm", out).conditions() == pressure_conditions(LEVELS, Condition("base"))
+    assert Metrics("arm", out).conditions() == metric_conditions(METRICS, Condition("base"))
+    assert get_args(MetricName) == get_args(conditions.MetricName)
+    assert get_args(Mode) == get_args(conditions.Mode)
+    for name in VARIATIONS:
+        assert Sensitivity("arm", out, vary=name).conditions() == variations(name, Condition("base"))
 
 
 def test_help(capsys):
