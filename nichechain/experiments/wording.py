@@ -153,10 +153,12 @@ def _caption(analysis: Analysis) -> str:
 def _means(analysis: Analysis, unit: str) -> Iterator[Block]:
     labels = [label for label, n in analysis.finished.items() if n]
     steps = sorted({0, *analysis.steps})
+    # Nothing has changed by step 0.
+    later = [step for step in analysis.steps if step]
     rows = []
     for label in labels:
         cells = [_mean(analysis.summary(label, step)) for step in steps]
-        for step in analysis.steps:
+        for step in later:
             (asked,) = (a for a in analysis.answers("change", step) if a.conditions == (label,))
             cells.append(asked.reason if asked.test is None else with_interval(asked.test.effect))
         others = [_mean(analysis.summary(label, analysis.last, m)) for m in ("evolvability", "coverage")]
@@ -169,7 +171,7 @@ def _means(analysis: Analysis, unit: str) -> Iterator[Block]:
             "Condition",
             "Runs",
             *(f"η* at {step}" for step in steps),
-            *(f"Change 0 to {step}" for step in analysis.steps),
+            *(f"Change 0 to {step}" for step in later),
             f"η at {analysis.last}",
             f"d/n at {analysis.last}",
         ),

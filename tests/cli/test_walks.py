@@ -82,6 +82,14 @@ def test_sensitivity(tmp_path, vary, capsys):
         assert condition.label in shown
 
 
+@pytest.mark.parametrize("kind", ["pressure", "metrics", "sensitivity"])
+def test_starts_alone(kind, tmp_path):
+    assert walks(kind, "arm", "--runs", "3", "--steps", "0", "--workers", "1", "--out", tmp_path) == 0
+    report = (tmp_path / "report.md").read_text()
+    assert "η\\* at 0" in report
+    assert "Change 0 to 0" not in report
+
+
 def test_more_runs(pressure, tmp_path, capsys):
     folder = tmp_path / "grown"
     levels = ("--levels", "selective,0.5,random")
