@@ -144,6 +144,8 @@ def _reservations(analysis: Analysis) -> Iterator[str]:
 
 
 def _caption(analysis: Analysis) -> str:
+    if not analysis.last:
+        return "η*, η and d/n of every run at step 0, with medians and quartiles."
     return (
         f"Mean over runs of expected evolvability η*, evolvability η and coverage d/n at each step, with "
         f"{_LEVEL} t-intervals, and η* of every run at step {analysis.last}."

@@ -189,8 +189,13 @@ def plot_runs(
             alpha=0.75,
             markeredgewidth=0,
         )
-    # Words under each other need less room than words in a row.
-    ax.set_xticks(range(len(labels)), [label.replace("-", "-\n").replace(" ", "\n") for label in labels])
+    # The name of what varies once, not at every tick; words under each other need less room.
+    varied = {label.partition(" ")[0] for label in labels if " " in label}
+    if len(varied) == 1 and all(" " in label for label in labels):
+        ax.set_xlabel(varied.pop())
+        labels = [label.partition(" ")[2] for label in labels]
+    ticks = [label.replace("-", "-\n").replace(":", ":\n").replace(" ", "\n") for label in labels]
+    ax.set_xticks(range(len(labels)), ticks, fontsize="small" if len(labels) > 6 else None)
     ax.set(xlim=(-0.6, len(labels) - 0.4), ylabel=_axis(measure, unit))
     # Runs of no evolvability at all would lie hidden under the axis.
     ax.set_ylim(bottom=-0.03 * ax.get_ylim()[1])
@@ -223,6 +228,8 @@ def draw_study(
     """
     from matplotlib.figure import Figure
 
+    if not records["step"].any():
+        return _draw_starts(records, conditions=conditions, ordered=ordered, unit=unit, title=title)
     figure = Figure(figsize=(11.0, 8.6), layout="constrained")
     axes = figure.subplots(2, 2, gridspec_kw={"height_ratios": (1.25, 1.0)})
     main = "expected_evolvability"
@@ -235,13 +242,31 @@ def draw_study(
     figure.legend(
         *axes[0, 0].get_legend_handles_labels(),
         loc="outside lower center",
-        ncols=min(6, records["condition"].nunique()),
+        ncols=min(records["condition"].nunique(), _columns(records["condition"].unique())),
         frameon=False,
         handlelength=3.2,
         fontsize="small",
     )
     figure.suptitle(title)
     return figure
+
+
+def _draw_starts(
+    records: pd.DataFrame, *, conditions: Sequence[str] | None, ordered: bool, unit: str, title: str
+) -> Figure:
+    """Walks of no step have no curves: every run by each measure."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(15.0, 4.6), layout="constrained")
+    for ax, measure in zip(figure.subplots(1, 3), MEASURES, strict=True):
+        plot_runs(records, ax, step=0, measure=measure, conditions=conditions, ordered=ordered, unit=unit)
+    figure.suptitle(f"{title}: every run at step 0, median and quartiles")
+    return figure
+
+
+def _columns(labels: Sequence[str]) -> int:
+    """Columns of a legend that the figure has room for."""
+    return max(1, min(6, 140 // (22 + max(map(len, labels)))))
 
 
 def _labels(records: pd.DataFrame, measure: str, conditions: Sequence[str] | None) -> list[str]:
