@@ -115,7 +115,8 @@ def as_whole(name: str, values: ArrayLike) -> NDArray[np.int64]:
 
     try:
         given = np.asarray(values)
-        whole = given.astype(np.int64)
+        with np.errstate(invalid="ignore"):
+            whole = given.astype(np.int64)
     except (TypeError, ValueError, OverflowError):
         raise NichechainError(
             f"{name} has values that are no whole numbers, or rows of unequal length"

@@ -106,6 +106,7 @@ TABLE: tuple[tuple[str, str, tuple[str, ...], Bad], ...] = (
             **_SCORES,
         },
     ),
+    ("completion", "Completion", ("bash",), {"shell": _UNKNOWN}),
     ("domains", "Domains", (), {}),
     (
         "estimate",
@@ -380,6 +381,7 @@ def _one(value: str) -> list[str]:
 _POSITIONAL = {
     "build": ("domain",),
     "compare": ("first", "second"),
+    "completion": ("shell",),
     "domains": (),
     "import": ("log",),
     "merge": ("first", "paths"),
