@@ -225,9 +225,16 @@ def draw_study(
     Returns
     -------
     matplotlib.figure.Figure
+
+    Raises
+    ------
+    NichechainError
+        As :func:`plot_walks` and :func:`plot_runs`.
     """
     from matplotlib.figure import Figure
 
+    if step not in set(records["step"]):
+        raise NichechainError(f"step is {step}, but the walks have steps 0 to {records['step'].max()}")
     if not records["step"].any():
         return _draw_starts(records, conditions=conditions, ordered=ordered, unit=unit, title=title)
     figure = Figure(figsize=(11.0, 8.6), layout="constrained")
