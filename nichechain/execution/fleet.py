@@ -260,7 +260,12 @@ class _Shift:
 
     def _supply(self, worker: Worker) -> None:
         held = self._held[worker]
-        while len(held) < _AHEAD and (piece := self._pieces.take()) is not None:
+        # A suspect has its worker to itself: a result that is lost on its way with the next piece's
+        # worker would else look like a worker lost to it.
+        while len(held) < _AHEAD and not any(piece.losses for piece in held):
+            piece = self._pieces.take(idle=not held)
+            if piece is None:
+                break
             held.append(piece)
             future = worker.submit(self._genotypes[piece.start : piece.stop])
             self._watch(worker, piece, future)

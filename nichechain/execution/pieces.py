@@ -53,10 +53,13 @@ class Pieces:
         self._done: dict[int, Evaluation] = {}
         self.left = rows
 
-    def take(self) -> Piece | None:
-        """The next piece to evaluate; None while all are out or done."""
+    def take(self, *, idle: bool = True) -> Piece | None:
+        """The next piece to evaluate; None while all are out or done.
+
+        One that a worker was at when it was lost is for an idle worker only.
+        """
         if self._returned:
-            return self._returned.popleft()
+            return self._returned.popleft() if idle or not self._returned[0].losses else None
         waiting = self._rows - self._cut
         if not waiting:
             return None

@@ -91,3 +91,14 @@ def test_a_row_that_is_a_chunk_gets_as_many_tries() -> None:
     assert last is not None
     assert not pieces.lose(last)
     assert pieces.take() is None
+
+
+def test_a_suspect_is_for_an_idle_worker() -> None:
+    pieces = Pieces(10, 1, 1)
+    first = pieces.take()
+    assert first is not None
+    assert pieces.lose(first)
+    assert pieces.take(idle=False) is None
+    suspect = pieces.take()
+    assert suspect is not None
+    assert (suspect.start, suspect.losses) == (first.start, 1)
