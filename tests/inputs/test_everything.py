@@ -69,7 +69,7 @@ def _public() -> dict[str, Any]:
     """Functions and classes that are for users, by where they were defined."""
     found: dict[str, Any] = {}
     for module in sorted(info.name for info in pkgutil.walk_packages(nichechain.__path__, "nichechain.")):
-        if module.startswith(("nichechain.cli", "nichechain.engine", "nichechain.__main__")):
+        if module.startswith(("nichechain.cli", "nichechain.domains.engine", "nichechain.__main__")):
             continue
         loaded = importlib.import_module(module)
         names = list(getattr(loaded, "__all__", ()))

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from nichechain.experiments import Condition
+from nichechain.studies import Condition
 
 from .table import (
     NOT_A_NUMBER,

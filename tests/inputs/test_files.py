@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from nichechain.importing import Axes, Columns
+from nichechain.archive.imported import Axes, Columns
 
 from .table import (
     LINEAGES,

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from nichechain.diversity import ArchiveRule
+from nichechain.walks.diversity import ArchiveRule
 
 from .table import (
     NOT_A_NUMBER,
