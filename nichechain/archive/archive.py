@@ -21,8 +21,8 @@ from nichechain.core.notebook import facts_table
 from nichechain.domains.base import Domain
 from nichechain.niches import Niche, Niches
 from nichechain.search.config import BuildConfig
+from nichechain.search.elites import Elites
 from nichechain.search.making import make_domain, make_mutation
-from nichechain.search.map_elites import Elites
 
 if TYPE_CHECKING:
     from torch import nn

@@ -19,7 +19,7 @@ from nichechain.core.errors import ArchiveError, NichechainError
 from nichechain.core.locking import writing
 from nichechain.niches import Niches
 from nichechain.search.config import BuildConfig
-from nichechain.search.map_elites import Elites, SearchState
+from nichechain.search.elites import Elites, SearchState
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

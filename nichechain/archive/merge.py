@@ -17,7 +17,7 @@ from nichechain.core.errors import ArchiveError, NichechainError
 from nichechain.core.locking import writing
 from nichechain.niches import Niches
 from nichechain.search.config import BuildConfig
-from nichechain.search.map_elites import Elites, SearchState
+from nichechain.search.elites import Elites, SearchState
 
 # What archives must have in common: what T is about, and what makes a birth an elite.
 _SHARED = (

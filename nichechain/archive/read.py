@@ -26,8 +26,8 @@ from nichechain.core.errors import ArchiveError
 from nichechain.domains.base import Domain
 from nichechain.niches import Niches
 from nichechain.search.config import BuildConfig
+from nichechain.search.elites import Elites, SearchState
 from nichechain.search.making import make_niches
-from nichechain.search.map_elites import Elites, SearchState
 
 FORMAT = 1
 META = "meta.json"

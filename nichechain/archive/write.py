@@ -53,7 +53,7 @@ from nichechain.core.files import write_atomically
 from nichechain.core.machine import library_versions, machine
 from nichechain.niches import CVTNiches, Niches
 from nichechain.search.config import BuildConfig
-from nichechain.search.map_elites import Elites, SearchState
+from nichechain.search.elites import Elites, SearchState
 
 PART_ROWS = 65_536
 

@@ -17,6 +17,7 @@ from nichechain.chain.base_measure import BaseMeasure
 from nichechain.chain.counts import TransitionCounts
 from nichechain.chain.empirical_bayes import design_effect, most_likely
 from nichechain.chain.estimators import with_posterior
+from nichechain.chain.families import counts_of_families, families_of
 from nichechain.chain.model import NicheChain
 from nichechain.chain.posterior import DirichletPosterior
 from nichechain.core.checks import check_numbers, check_whole
@@ -24,7 +25,6 @@ from nichechain.core.errors import NichechainError
 from nichechain.core.randomness import Purpose, keyed
 from nichechain.evolvability.averaging import DRAWS, Convention
 from nichechain.evolvability.niches import niche_evolvability
-from nichechain.validation.held_out import counts_of_families, families_of
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nichechain.core.errors import NichechainError
+from nichechain.core.intervals import mean_interval
 from nichechain.plots.style import FAINT, INK
 
 if TYPE_CHECKING:
@@ -105,8 +106,6 @@ def plot_walks(
     -----
     Source: the paper's figures of both experiments. A condition with a single run has no band.
     """
-    from nichechain.studies.statistics import mean_interval
-
     labels = _labels(records, measure, conditions)
     for place, (label, style) in enumerate(line_styles(labels, ordered=ordered).items()):
         table = _pivot(records, label, measure)

@@ -14,7 +14,7 @@ from nichechain.core.errors import NichechainError
 from nichechain.domains.base import Evaluation
 from nichechain.pyribs.recording import Recording
 from nichechain.pyribs.translation import empty_archive, niches_of
-from nichechain.search.map_elites import Elites, SearchState
+from nichechain.search.elites import Elites, SearchState
 
 if TYPE_CHECKING:
     from nichechain.archive.archive import Archive

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from nichechain.core.errors import NichechainError
+from nichechain.core.intervals import mean_interval
 from nichechain.studies import paper
 from nichechain.studies.conditions import Condition, pressure_of
 from nichechain.studies.dissimila import HORIZON, DissimilaStudy, study_dissimila
@@ -16,7 +17,6 @@ from nichechain.studies.results import GroupTest, HypothesisTest
 from nichechain.studies.statistics import (
     RESAMPLES,
     change_test,
-    mean_interval,
     metric_test,
     paired_test,
     pressure_test,

@@ -13,10 +13,11 @@ import pyarrow.parquet as pq
 
 from nichechain.core.errors import NichechainError
 from nichechain.core.files import write_atomically
+from nichechain.core.intervals import LEVEL
 from nichechain.core.machine import library_versions, machine
 from nichechain.studies import findings
 from nichechain.studies.analysis import Analysis, analyse, plain, varied
-from nichechain.studies.statistics import LEVEL, RESAMPLES
+from nichechain.studies.statistics import RESAMPLES
 from nichechain.studies.study import Study
 from nichechain.studies.wording import compose, title
 

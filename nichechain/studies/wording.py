@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Iterator
 from dataclasses import fields
 
+from nichechain.core.intervals import LEVEL
 from nichechain.landscape import QUANTILES
 from nichechain.studies import findings, paper
 from nichechain.studies.analysis import MAIN, Analysis, Asked, Summary, varied
@@ -22,7 +23,6 @@ from nichechain.studies.document import (
     Table,
 )
 from nichechain.studies.findings import number, with_interval
-from nichechain.studies.statistics import LEVEL
 
 _LEVEL = f"{100 * LEVEL:.0f} %"
 _TITLES = {

@@ -18,13 +18,14 @@ from numpy.typing import NDArray
 
 from nichechain.births.table import NONE
 from nichechain.chain import NicheChain, TransitionCounts, estimate
+from nichechain.chain.families import counts_of_families, families_of
 from nichechain.core.checks import as_floats, check_whole
 from nichechain.core.errors import NichechainError
 from nichechain.core.randomness import Purpose, keyed
 from nichechain.evolvability import l_evolvability
 from nichechain.evolvability.coverage import check_lengths
 from nichechain.niches import GridNiches
-from nichechain.validation.held_out import counts_of_families, families_of, probability_of
+from nichechain.validation.held_out import probability_of
 
 if TYPE_CHECKING:
     from nichechain.archive.archive import Archive

@@ -17,6 +17,7 @@ from scipy.special import gammaln, softmax
 from nichechain.chain.base_measure import BaseMeasure
 from nichechain.chain.counts import TransitionCounts
 from nichechain.chain.estimators import Unvisited, estimate
+from nichechain.chain.families import counts_of_families, families_of
 from nichechain.chain.model import NicheChain
 from nichechain.chain.posterior import DirichletPosterior
 from nichechain.core.checks import check_whole
@@ -183,24 +184,6 @@ def _fits(counts: TransitionCounts) -> Iterator[tuple[str, Fit]]:
     for policy in get_args(Unvisited):
         if policy != "absorb" or counts.niches.outside != "clip":
             yield f"mle, unvisited: {policy}", partial(estimate, estimator="mle", unvisited=policy)
-
-
-def families_of(counts: TransitionCounts) -> Ints:
-    """Rows (state, elite, child, children); children of nobody in particular are elites' only ones."""
-    known = TransitionCounts.from_pairs(
-        counts.families[:, 0], counts.families[:, 2], counts.niches, counts.families[:, 3]
-    )
-    orphans = (counts.matrix - known.matrix).tocoo()
-    parent, child = (np.repeat(axis, orphans.data) for axis in orphans.coords)
-    number = counts.families[:, 1].max(initial=-1) + 1 + np.arange(parent.size)
-    alone = np.stack([parent, number, child, np.ones_like(number)], axis=1)
-    return np.concatenate([counts.families, alone]).astype(np.int64)
-
-
-def counts_of_families(families: Ints, counts: TransitionCounts) -> TransitionCounts:
-    """Counts of some families (F, 4), over the niches of the counts that they come from."""
-    pairs = TransitionCounts.from_pairs(families[:, 0], families[:, 2], counts.niches, families[:, 3])
-    return TransitionCounts(pairs.matrix, counts.niches, pairs.visits, families)
 
 
 def probability_of(chain: NicheChain, parent: Ints, child: Ints) -> Floats:

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from nichechain.births.table import NONE, Offspring
 from nichechain.niches import Niches
-from nichechain.search.map_elites import Elites
+from nichechain.search.elites import Elites
 from nichechain.verification.result import Check
 from nichechain.verification.runs import Births, Ints, Run, differs
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from nichechain.births.table import NONE, Offspring
 from nichechain.core.randomness import Purpose, keyed
 from nichechain.domains.base import Domain
-from nichechain.search.map_elites import Elites
+from nichechain.search.elites import Elites
 from nichechain.variation import Mutation
 from nichechain.verification.result import GENOTYPES, Check
 from nichechain.verification.runs import Run, differs, largest_difference

@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 from nichechain.births.table import NONE, Offspring
 from nichechain.domains.base import Domain, Evaluation
 from nichechain.niches import Niches
-from nichechain.search.map_elites import Elites, MapElites, SearchState
+from nichechain.search.elites import Elites, SearchState
+from nichechain.search.map_elites import MapElites
 from nichechain.verification.result import SEARCH, Check
 from nichechain.verification.runs import Births, Bools, Run, differs, largest_difference
 

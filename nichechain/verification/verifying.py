@@ -19,8 +19,8 @@ from nichechain.core.randomness import Purpose, keyed
 from nichechain.domains.base import Domain, Evaluation
 from nichechain.execution import Executor, Threads
 from nichechain.execution.base import WORKER_DIED
+from nichechain.search.elites import Elites
 from nichechain.search.making import make_niches
-from nichechain.search.map_elites import Elites
 from nichechain.verification import record
 from nichechain.verification.evaluations import check_evaluations, evaluated
 from nichechain.verification.replay import Regrowth

@@ -21,7 +21,7 @@ from nichechain.core.errors import ArchiveError, NichechainError
 from nichechain.domains import Evaluation, PlanarArm
 from nichechain.domains.base import Domain
 from nichechain.execution import Threads
-from nichechain.search import map_elites as illumination
+from nichechain.search import elites, map_elites
 from nichechain.search.config import BuildConfig
 
 CONFIG = BuildConfig(
@@ -184,7 +184,7 @@ def test_resumes_after_an_interrupt_while_keeping(
 ) -> None:
     """Half a batch in the archive must not be committed."""
     calls = itertools.count()
-    add = illumination._Archive.add
+    add = elites.EliteArchive.add
 
     def interrupted(self: Any, candidates: Any) -> Any:
         result = add(self, candidates)
@@ -193,7 +193,7 @@ def test_resumes_after_an_interrupt_while_keeping(
         return result
 
     with monkeypatch.context() as patch:
-        patch.setattr(illumination._Archive, "add", interrupted)
+        patch.setattr(elites.EliteArchive, "add", interrupted)
         with Threads(1) as executor, pytest.raises(KeyboardInterrupt):
             build(SHORT, tmp_path, executor, domain=RoughArm())
     assert built(tmp_path, config=SHORT) == short
@@ -204,7 +204,7 @@ def interrupt_at(line: int, folder: Path, config: BuildConfig, function: str | N
 
     Lines are counted as they are run, in one function or in all that build, search and store.
     """
-    files = {module.__file__ for module in (building, illumination, write)}
+    files = {module.__file__ for module in (building, map_elites, elites, write)}
     lines = 0
 
     def trace(frame: FrameType, event: str, _argument: object) -> Any:
@@ -374,7 +374,7 @@ def test_commits_take_no_more_than_a_hundredth_of_the_time(
             now += 1.0
             return super().evaluate(domain, genotypes, on_done)
 
-    def slowly(writer: write.Writer, state: illumination.SearchState) -> None:
+    def slowly(writer: write.Writer, state: elites.SearchState) -> None:
         nonlocal now
         commits.append(now)
         now += 5.0

@@ -9,7 +9,7 @@ import pytest
 import nichechain as nc
 from nichechain.archive.merge import _largest, merge
 from nichechain.core.errors import ArchiveError, NichechainError
-from nichechain.search.map_elites import Elites
+from nichechain.search.elites import Elites
 
 CONFIG = nc.BuildConfig(
     "arm", (5, 4), ((-0.7, 1.0), (-0.9, 0.8)), evaluations=300, initial=40, batch=32, scale=0.5

@@ -24,7 +24,8 @@ from nichechain.domains import Evaluation, PlanarArm
 from nichechain.execution import Threads
 from nichechain.niches import GridNiches
 from nichechain.search.config import BuildConfig
-from nichechain.search.map_elites import Elites, MapElites
+from nichechain.search.elites import Elites
+from nichechain.search.map_elites import MapElites
 
 CONFIG = BuildConfig(
     "arm",

@@ -18,7 +18,7 @@ from nichechain.archive.build import build
 from nichechain.domains import Evaluation, PlanarArm
 from nichechain.execution import Threads
 from nichechain.search.config import BuildConfig
-from nichechain.search.map_elites import SearchState
+from nichechain.search.elites import SearchState
 
 # 333 births end in the middle of a step, so children are pending.
 CONFIG = BuildConfig(
