@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from nichechain.core.checks import check_numbers
 from nichechain.core.errors import NichechainError
-from nichechain.variation.noise import IndependentNoise, Noise, truncated
+from nichechain.variation.noise import IndependentNoise, MutationNoise, truncated
 
 Floats = NDArray[np.float64]
 # Of floats of any precision: that of float32 in a search, of others in a test.
@@ -72,7 +72,7 @@ class AdditiveMutation:
 
     Parameters
     ----------
-    noise : Noise
+    noise : MutationNoise
         ``noise(rng, n)`` gives n float64 values at scale 1.
     scale : float
         Factor on the noise, positive.
@@ -96,7 +96,7 @@ class AdditiveMutation:
     never leave the set.
     """
 
-    noise: Noise
+    noise: MutationNoise
     scale: float = 1.0
     bound: Bound | None = None
     layers: tuple[int, ...] = ()
@@ -132,7 +132,7 @@ class AdditiveMutation:
         return self.scale * np.repeat(self.layer_scales, self.layers)
 
 
-def check_bound(noise: Noise, bound: Bound | None) -> None:
+def check_bound(noise: MutationNoise, bound: Bound | None) -> None:
     """Check that noise can be bounded so.
 
     Raises
@@ -148,7 +148,11 @@ def check_bound(noise: Noise, bound: Bound | None) -> None:
 
 
 def add_noise(
-    parent: Genotype, rng: np.random.Generator, noise: Noise, scale: float | Floats, bound: Bound | None
+    parent: Genotype,
+    rng: np.random.Generator,
+    noise: MutationNoise,
+    scale: float | Floats,
+    bound: Bound | None,
 ) -> Genotype:
     """One child of a parent.
 
@@ -156,7 +160,7 @@ def add_noise(
     ----------
     parent : (P,) float array
     rng : numpy.random.Generator
-    noise : Noise
+    noise : MutationNoise
     scale : float or (P,) array
         Factor on the noise.
     bound : Bound, optional
