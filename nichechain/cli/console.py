@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
-    from nichechain.building import Progress
+    from nichechain.archive.build import Progress
 
 Command = TypeVar("Command")
 

@@ -25,7 +25,7 @@ class Info:
 def run(arguments: Sequence[str]) -> int:
     """Say what is in the archive."""
     command = console.parse(Info, arguments)
-    from nichechain.archive import load
+    from nichechain.archive.archive import load
 
     archive = load(command.path)
     meta, counts, config = archive.meta, archive.counts, archive.config
