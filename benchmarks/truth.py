@@ -18,18 +18,32 @@ from __future__ import annotations
 
 import argparse
 import importlib
+import itertools
 import time
 from pathlib import Path
 
 import pandas as pd
-from truth_data import DATASETS, load, make
+from truth_data import BIRTHS, DATASETS, load, make
 from truth_models import ESTIMATORS, Estimator
-from truth_scores import score
+from truth_scores import score, thinned
 
 from nichechain import Threads
 
 _LEVELS = (1, 2, 3, 4, 5, 10)
 _FEWEST = 2_000
+_HEAD = """# Predictions beside what real lineages reached
+
+Made by `benchmarks/truth.py`, which says how; every figure is in `scores.csv` and `thinned.csv`.
+
+- *level*: niches predicted over niches reached, both means over elites, after l generations.
+- *covered*: share of elites whose number lies in the 90 % interval of what as many simulated lineages
+  reach. An interval of the expected number alone would be too narrow for one observed number.
+- *ρ*: Spearman's correlation at l = 5, beside its ceiling, that of full knowledge of every elite.
+- *births*, *steps*: means of the logarithm of the probability of held-out births, and of steps of the
+  lineages.
+- *of lineages*: share of the births that were spent on lineages without selection."""
+_THINNED_HEAD = """Mean niche l-evolvability of the same niches at l = 5, three times for each kind of fifth.
+*inside*: how often the number from all births lies in the interval."""
 
 
 def main() -> None:
@@ -71,72 +85,93 @@ def _score(given: argparse.Namespace, name: str, split: str, estimators: dict[st
     if truth is None:
         _tell(f"{name} {split}: not made yet")
         return
-    for label, estimator in estimators.items():
-        for births in given.births:
-            for share in given.share:
-                if share and truth.extra is None:
-                    continue
-                path = given.folder / name / "scores" / f"{split}-{births}-{share:g}-{label}.parquet"
-                if given.again or not path.exists():
-                    frame = score(estimator, truth, births, share)
-                    about = {
-                        "data": name,
-                        "split": split,
-                        "births": births,
-                        "share": share,
-                        "estimator": label,
-                    }
-                    for place, (column, value) in enumerate(about.items()):
-                        frame.insert(place, column, value)
-                    path.parent.mkdir(exist_ok=True)
-                    frame.to_parquet(path)
-                _tell(_line(pd.read_parquet(path)))
+    for label, births, share in itertools.product(estimators, given.births, given.share):
+        if share and truth.extra is None:
+            continue
+        about = {"data": name, "split": split, "births": births, "share": share, "estimator": label}
+        for kind, (judge, line) in _KINDS.items():
+            if kind == "thinned" and births < BIRTHS:
+                continue
+            path = given.folder / name / kind / f"{split}-{births}-{share:g}-{label}.parquet"
+            if given.again or not path.exists():
+                frame = judge(estimators[label], truth, births, share)
+                for place, (column, value) in enumerate(about.items()):
+                    frame.insert(place, column, value)
+                path.parent.mkdir(exist_ok=True)
+                frame.to_parquet(path)
+            _tell(" ".join(map(str, about.values())) + line(pd.read_parquet(path)))
 
 
-def _line(frame: pd.DataFrame) -> str:
-    """One line of the most telling figures."""
-    first = frame.iloc[0]
-    text = f"{first.data} {first.split} {first.births} {first.share:g} {first.estimator}: "
+def _scores_line(frame: pd.DataFrame) -> str:
+    """The most telling figures."""
+    text = ""
     for start, rows in frame.groupby("start", sort=False):
-        rows = rows.set_index("generation")
         levels = " ".join(f"{value:.2f}" for value in rows["level"])
-        five = rows.loc[5]
+        five = rows.set_index("generation").loc[5]
         text += (
-            f"| {start} {levels} covered {five.covered:.2f} "
-            f"rho {five.spearman:.2f} (model {five.expected:.2f}, ceiling {five.ceiling:.2f}) "
+            f" | {start} {levels} covered {five.covered:.2f} "
+            f"rho {five.spearman:.2f} (model {five.expected:.2f}, ceiling {five.ceiling:.2f})"
         )
-    return text + (
-        f"| births {first.births_log:.3f} steps {first.steps_log:.3f} "
+    first = frame.iloc[0]
+    return (
+        f"{text} | births {first.births_log:.3f} steps {first.steps_log:.3f} "
         f"| fit {first.fit:.2g} s, forecast {first.forecast:.2g} s"
     )
 
 
+def _thinned_line(frame: pd.DataFrame) -> str:
+    text = f" | all {frame.whole[0]:.1f}"
+    for kept, rows in frame.groupby("kept"):
+        text += f" | a fifth of {kept}:"
+        text += ",".join(f" {r.fifth:.1f} [{r.low:.1f}, {r.high:.1f}]" for r in rows.itertuples())
+    return text
+
+
+_KINDS = {"scores": (score, _scores_line), "thinned": (thinned, _thinned_line)}
+
+
 def _report(folder: Path, names: list[str], out: Path) -> None:
-    """Tables of all scores: ``scores.csv`` with every figure, ``report.md`` to be read."""
-    parts = [
-        pd.read_parquet(p) for name in names for p in sorted((folder / name / "scores").glob("*.parquet"))
-    ]
-    if not parts:
-        raise SystemExit(f"{folder} holds no scores: run score first")
-    scores = pd.concat(parts, ignore_index=True)
-    scores.insert(1, "development", [DATASETS[name].development for name in scores["data"]])
+    """Tables of all scores: two with every figure, and ``report.md`` to be read."""
+    scores, fifths = (_read(folder, names, kind) for kind in _KINDS)
     out.mkdir(parents=True, exist_ok=True)
     scores.round(5).to_csv(out / "scores.csv", index=False)
-    text = [
-        "# Predictions beside what real lineages reached",
-        "",
-        "Made by `benchmarks/truth.py`, which says how; every figure is in `scores.csv`. Level is the "
-        "number of niches predicted over the number reached, both means over elites. *Covered* is the "
-        "share of elites whose number lies in the 90 % interval of what as many simulated lineages "
-        "reach. ρ is Spearman's correlation at l = 5, over its ceiling: what full knowledge of every "
-        "elite would have. The last columns are means of the logarithm of the probability of held-out "
-        "births and of steps of the lineages.",
-    ]
+    fifths.round(5).to_csv(out / "thinned.csv", index=False)
+    text = [_HEAD]
     for development, title in ((True, "For development"), (False, "Held out")):
         chosen = scores[scores["development"] == development]
         if len(chosen):
             text += ["", f"## {title}", "", *_table(chosen)]
+    if len(fifths):
+        text += [
+            "",
+            "## From a fifth of the births, or of the elites",
+            "",
+            _THINNED_HEAD,
+            "",
+            *_fifths(fifths),
+        ]
     (out / "report.md").write_text("\n".join(text) + "\n")
+
+
+def _read(folder: Path, names: list[str], kind: str) -> pd.DataFrame:
+    parts = [pd.read_parquet(p) for name in names for p in sorted((folder / name / kind).glob("*.parquet"))]
+    if not parts:
+        raise SystemExit(f"{folder} holds no {kind}: run score first")
+    whole = pd.concat(parts, ignore_index=True)
+    whole.insert(1, "development", [DATASETS[name].development for name in whole["data"]])
+    return whole
+
+
+def _fifths(frame: pd.DataFrame) -> list[str]:
+    lines = ["data | of lineages | estimator | from all | a fifth of | from a fifth [90 %] | inside"]
+    lines.append(" | ".join(["---"] * 7))
+    for (data, split, share, estimator, kept), rows in frame.groupby(
+        ["data", "split", "share", "estimator", "kept"], sort=False
+    ):
+        parts = ", ".join(f"{r.fifth:.1f} [{r.low:.1f}, {r.high:.1f}]" for r in rows.itertuples())
+        cells = [f"{data} {split}", f"{share:.0%}", estimator, f"{rows.whole.iloc[0]:.1f}", kept, parts]
+        lines.append(" | ".join([*cells, f"{rows.inside.sum()} of {len(rows)}"]))
+    return [f"| {line} |" for line in lines]
 
 
 def _table(scores: pd.DataFrame) -> list[str]:

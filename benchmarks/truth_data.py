@@ -14,7 +14,6 @@ Everything is a function of the table below, and is made once; what is there is 
 
 from __future__ import annotations
 
-import os
 import shutil
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -27,9 +26,9 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 import nichechain
-from nichechain import store
+from nichechain.archive import read
 from nichechain.births import NONE
-from nichechain.randomness import Purpose, keyed
+from nichechain.core.randomness import Purpose, keyed
 from nichechain.validation import Lineages, run_lineages
 from nichechain.verification.replay import replayed
 
@@ -157,7 +156,7 @@ def make(name: str, folder: Path, executor: nichechain.Threads, tell: Callable[[
     path = home / "archive"
     if data.shipped and not path.exists():
         shutil.copytree(nichechain.load(data.shipped).folder, path)
-    if not store.is_archive(path) or store.read_meta(path).births < BIRTHS:
+    if not data.shipped:
         tell(f"{name}: archive")
         nichechain.build(data.config(), path, executor)
     archive = nichechain.load(path)
@@ -172,7 +171,9 @@ def load(name: str, folder: Path, split: str = "A") -> Truth | None:
     if not (home / f"truth-{split}.npz").exists():
         return None
     archive = nichechain.load(home / "archive")
-    births = store.read_births(archive.folder, archive.meta)
+    births = read.read_births(archive.folder, archive.meta)
+    if "lineage" not in births.column_names:
+        births = births.append_column("lineage", pa.array(np.zeros(len(births), bool)))
     path = home / "lineage-births-course.parquet"
     with np.load(home / f"truth-{split}.npz") as kept:
         lineages = Lineages(*(kept[k].astype(np.int64) for k in ("root_niche", "niches", "offspring")))
@@ -233,7 +234,7 @@ def _make_truth(
         }
         scratch = path.with_suffix(".tmp.npz")
         np.savez_compressed(scratch, **kept_now)
-        os.replace(scratch, part if done < roots.size else path)
+        scratch.replace(part if done < roots.size else path)
     part.unlink(missing_ok=True)
 
 
@@ -283,14 +284,14 @@ def _make_births(
     frame = pd.DataFrame(rows).sort_values(["lineage", "generation"], ignore_index=True)
     scratch = path.with_suffix(".tmp")
     frame.to_parquet(scratch)
-    os.replace(scratch, path)
+    scratch.replace(path)
 
 
 def _starts(
     archive: nichechain.Archive, number: int, rng: np.random.Generator
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, dict[int, np.ndarray], np.ndarray]:
     """Elites as they were over the course of a search: their uids, niches, depths and genotypes."""
-    table = store.read_births(archive.folder, archive.meta)
+    table = read.read_births(archive.folder, archive.meta)
     parent, landed, depth, step = (
         table[name].fill_null(NONE).to_numpy().astype(np.int64)
         for name in ("parent_uid", "child_niche", "depth", "step")
@@ -334,6 +335,8 @@ def _extra(path: Path, births: pa.Table) -> pa.Table:
             columns[column.name] = pa.array(np.array(kept[column.name]), mask=failed).cast(column.type)
         elif column.name in kept.column_names:
             columns[column.name] = kept[column.name].combine_chunks().cast(column.type)
+        elif column.name == "lineage":
+            columns[column.name] = pa.array(np.array(kept["generation"]) > 1)
         elif column.name == "failed":
             columns[column.name] = pa.array(np.where(failed, "failed", ""), mask=~failed)
         else:

@@ -16,7 +16,8 @@ from scipy import sparse
 
 from nichechain import NicheChain, Niches, TransitionCounts, estimate
 from nichechain.births import NONE
-from nichechain.validation import simulate_lineages
+from nichechain.core.row_sampler import RowSampler
+from nichechain.validation.rollouts import niches_reached
 
 DRAWS, CHECKS = 50, 200
 """Draws of what births leave unknown, and simulated checks on all of them together."""
@@ -76,15 +77,21 @@ class Forecast:
 
     Parameters
     ----------
-    value : (R, l) float64 array
-        Expected number of niches up to each generation.
+    draws : (D, R, l) float64 array
+        Expected number of niches up to each generation, in each draw of all that births leave
+        unknown; a single one where the model has no such thing.
     simulated : (R, l, K) int64 array
-        Numbers of K simulated checks, each on one draw of all that births leave unknown. What is
-        unknown and the chance of so few lineages are both in their spread.
+        Numbers of K simulated checks on those draws: what is unknown and the chance of so few
+        lineages are both in their spread.
     """
 
-    value: np.ndarray
+    draws: np.ndarray
     simulated: np.ndarray
+
+    @property
+    def value(self) -> np.ndarray:
+        """Expected number, (R, l)."""
+        return self.draws.mean(axis=0)
 
 
 class Model(Protocol):
@@ -100,6 +107,8 @@ class Model(Protocol):
 
 
 Estimator = Callable[[pa.Table, Niches], Model]
+"""Births have the columns of :mod:`nichechain.births`, and ``lineage``: whether the parent is the
+latest birth of a lineage without selection. A parent need not be among the births."""
 
 
 class PlainChain:
@@ -140,14 +149,13 @@ class PlainChain:
                 firsts.append(weight / weight.sum(axis=1, keepdims=True))
             first = np.concatenate(firsts)
             values.append(coverage(matrix, first, generations, lineages, chain.n_niches))
-            simulated += [
-                simulated_coverage(matrix, first, generations, lineages, chain.n_niches, rng)
-                for _ in range(CHECKS // draws)
-            ]
-        value, checks = np.mean(values, axis=0), np.stack(simulated, axis=2)
+            simulated.append(
+                simulated_coverage(matrix, first, generations, lineages, chain.n_niches, CHECKS // draws, rng)
+            )
+        expected, checks = np.stack(values), np.concatenate(simulated, axis=2)
         size = roots.niche.size
         return {
-            start: Forecast(value[k * size :][:size], checks[k * size :][:size])
+            start: Forecast(expected[:, k * size :][:, :size], checks[k * size :][:size])
             for k, start in enumerate(STARTS)
         }
 
@@ -185,29 +193,22 @@ def simulated_coverage(
     generations: int,
     lineages: int,
     niches: int,
+    checks: int,
     rng: np.random.Generator,
 ) -> np.ndarray:
-    """Number of niches that simulated lineages reach, (m, generations)."""
-    size = len(matrix)
+    """Number of niches that simulated lineages reach, (m, generations, checks)."""
+    size, roots = len(matrix), len(first)
     # The starts are states of their own, entered from nowhere.
-    whole = np.zeros((size + len(first), size + len(first)))
+    whole = np.zeros((size + roots, size + roots))
     whole[:size, :size], whole[size:, :size] = matrix, first
-    begin = np.repeat(np.arange(len(first)) + size, lineages)
-    states = simulate_lineages(sparse.csr_array(whole), begin, generations + 1, rng)[:, 1:]
-    return reached(states.reshape(len(first), lineages, generations), niches)
-
-
-def reached(states: np.ndarray, niches: int) -> np.ndarray:
-    """Distinct niches of (R, U, l) lineages up to each generation, (R, l)."""
-    roots, lineages, generations = states.shape
-    seen = np.zeros((roots, niches + 1), bool)
-    row = np.repeat(np.arange(roots), lineages)
-    found = np.empty((roots, generations), np.int64)
-    for k in range(generations):
-        here = states[:, :, k].ravel()
-        seen[row, np.where((here >= 0) & (here < niches), here, niches)] = True
-        found[:, k] = seen[:, :niches].sum(axis=1)
-    return found
+    begin = np.repeat(np.arange(size, size + roots), checks * lineages)
+    sampler, here, states = RowSampler(sparse.csr_array(whole)), begin, []
+    for _ in range(generations):
+        here = sampler.draw(here, rng)
+        states.append(here)
+    walks = np.stack(states, axis=-1).reshape(roots * checks, lineages, generations)
+    found = niches_reached(walks, niches)
+    return found.reshape(roots, checks, generations).swapaxes(1, 2)
 
 
 def _landed(offspring: np.ndarray, states: int) -> np.ndarray:

@@ -10,13 +10,15 @@ import pandas as pd
 import pyarrow as pa
 from scipy import stats
 from truth_data import GENERATIONS, Truth
-from truth_models import Estimator, Forecast, Model, Roots, Steps, reached
+from truth_models import Estimator, Forecast, Model, Roots, Steps
 
 from nichechain import Niches
 from nichechain.births import NONE
-from nichechain.randomness import Purpose, keyed
+from nichechain.core.randomness import Purpose, keyed
+from nichechain.validation.rollouts import niches_reached
 
 HISTORY, FOLDS, HALVES = 12, 3, 200
+THINNINGS, THINNED_AT = 3, 5
 SHOWN = (1, 2, 3, 4, 5, GENERATIONS)
 INTERVAL = (0.05, 0.95)
 _STEPS_PER_ELITE = 200
@@ -40,12 +42,13 @@ def score(estimator: Estimator, truth: Truth, births: int, share: float, seed: i
     -------
     DataFrame
         One row per start and generation: ``elites``; ``reached`` and ``predicted``, means;
-        ``level``, their ratio; ``bias``, predicted minus reached, with a 95 % t-interval over
-        elites; ``covered``, see the notes; ``spearman``, and ``expected``, its median were the
-        model right; ``ceiling``, see :func:`ceiling`. The same in every row are ``births_log`` and
-        ``births_impossible`` of held-out births, ``steps_log`` and ``steps_impossible`` of steps of
-        the lineages (means of the logarithm of the probability; share of probability 0), and
-        seconds of the processor to ``fit`` and to ``forecast``.
+        ``level``, their ratio, with the 90 % interval that the model gives it; ``bias``, predicted
+        minus reached, with a 95 % t-interval over elites; ``covered``, see the notes; ``spearman``,
+        and ``expected``, its median were the model right; ``ceiling``, see :func:`ceiling`. The
+        same in every row are ``births_log`` and ``births_impossible`` of held-out births,
+        ``steps_log`` and ``steps_impossible`` of steps of the lineages (means of the logarithm of
+        the probability; share of probability 0), and seconds of the processor to ``fit`` and to
+        ``forecast``.
 
     Notes
     -----
@@ -65,7 +68,7 @@ def score(estimator: Estimator, truth: Truth, births: int, share: float, seed: i
     began = time.process_time()
     forecasts = model.forecast(roots, GENERATIONS, states.shape[1], seed)
     foretold = time.process_time() - began
-    real = reached(states, len(niches))
+    real = niches_reached(states, len(niches))
     recorded = np.isin(roots.uid, _column(table, "uid"))
     rows = []
     for start, forecast in forecasts.items():
@@ -73,8 +76,10 @@ def score(estimator: Estimator, truth: Truth, births: int, share: float, seed: i
         if mask.sum() < 3:
             continue
         best = ceiling(states[mask], len(niches), seed)
-        for k in (generation - 1 for generation in SHOWN):
-            rows.append({"start": start, **_row(forecast, real, mask, k), "ceiling": best[k]})
+        rows += [
+            {"start": start, **_row(forecast, real, mask, generation), "ceiling": best[generation - 1]}
+            for generation in SHOWN
+        ]
     frame = pd.DataFrame(rows)
     frame["births_log"], frame["births_impossible"] = held_out(estimator, table, niches, seed)
     frame["steps_log"], frame["steps_impossible"] = _mean(
@@ -109,7 +114,8 @@ def ceiling(states: np.ndarray, niches: int, seed: int = 0) -> np.ndarray:
     for repeat in range(HALVES):
         order = rng.permutation(lineages)
         halves = (
-            reached(states[:, part], niches) for part in (order[: lineages // 2], order[lineages // 2 :])
+            niches_reached(states[:, part], niches)
+            for part in (order[: lineages // 2], order[lineages // 2 :])
         )
         one, other = (stats.rankdata(half, axis=0) for half in halves)
         with np.errstate(invalid="ignore"):
@@ -117,6 +123,43 @@ def ceiling(states: np.ndarray, niches: int, seed: int = 0) -> np.ndarray:
             found[repeat] = (one * other).sum(axis=0) / np.sqrt((one**2).sum(axis=0) * (other**2).sum(axis=0))
     half = np.maximum(found.mean(axis=0), 0.0)
     return np.sqrt(2 * half / (1 + half))
+
+
+def thinned(estimator: Estimator, truth: Truth, births: int, share: float, seed: int = 0) -> pd.DataFrame:
+    """Whether a fifth of what is known gives the same number, give or take its interval.
+
+    Returns
+    -------
+    DataFrame
+        One row per repeat and ``kept``, a fifth of the ``births`` or of the ``elites`` with all
+        their children: ``whole``, the mean of niche l-evolvability over the roots at l = 5 from all
+        births; ``fifth``, that from a fifth, with its 90 % interval ``low`` to ``high``; and
+        whether the whole one lies ``inside``.
+    """
+    table, niches = truth.given(births, share), truth.niches
+    roots = Roots(truth.lineages.roots, truth.uid, truth.lineages.offspring)
+    everyone = np.ones(roots.niche.size, bool)
+    lineages = truth.lineages.states.shape[1]
+
+    def forecast(rows: pa.Table) -> Forecast:
+        return estimator(rows, niches).forecast(roots, THINNED_AT, lineages, seed)["niche"]
+
+    whole = float(forecast(table).value[:, -1].mean())
+    elite = _column(table, "parent_uid")
+    rows = []
+    for repeat in range(THINNINGS):
+        rng = keyed(seed, Purpose.THINNING, repeat)
+        masks = {
+            "births": rng.random(len(table)) < 0.2,
+            "elites": (rng.random(int(elite.max()) + 2) < 0.2)[elite],
+        }
+        for kept, mask in masks.items():
+            part = forecast(table.filter(pa.array(mask | (elite == NONE))))
+            low, high = _level(part, everyone, THINNED_AT - 1)
+            fifth = float(part.value[:, -1].mean())
+            found = {"whole": whole, "fifth": fifth, "low": low, "high": high}
+            rows.append({"kept": kept, "repeat": repeat, **found, "inside": low <= whole <= high})
+    return pd.DataFrame(rows)
 
 
 def held_out(estimator: Estimator, births: pa.Table, niches: Niches, seed: int = 0) -> tuple[float, float]:
@@ -184,17 +227,21 @@ def _histories(births: pa.Table, last: np.ndarray) -> np.ndarray:
     return history
 
 
-def _row(forecast: Forecast, real: np.ndarray, mask: np.ndarray, k: int) -> dict[str, float]:
+def _row(forecast: Forecast, real: np.ndarray, mask: np.ndarray, generation: int) -> dict[str, float]:
+    k = generation - 1
     value, number, checks = forecast.value[mask, k], real[mask, k], forecast.simulated[mask, k]
     low, high = np.quantile(checks, INTERVAL, axis=1, method="weibull")
+    least, most = _level(forecast, mask, k)
     bias = value - number
     width = stats.t.ppf(0.975, bias.size - 1) * bias.std(ddof=1) / np.sqrt(bias.size)
     return {
-        "generation": k + 1,
+        "generation": generation,
         "elites": bias.size,
         "reached": number.mean(),
         "predicted": value.mean(),
         "level": value.mean() / number.mean(),
+        "level_low": least / number.mean(),
+        "level_high": most / number.mean(),
         "bias": bias.mean(),
         "bias_low": bias.mean() - width,
         "bias_high": bias.mean() + width,
@@ -202,6 +249,12 @@ def _row(forecast: Forecast, real: np.ndarray, mask: np.ndarray, k: int) -> dict
         "spearman": _spearman(value, number),
         "expected": np.median([_spearman(value, check) for check in checks.T]),
     }
+
+
+def _level(forecast: Forecast, mask: np.ndarray, k: int) -> tuple[float, float]:
+    """90 % interval of the mean over roots."""
+    low, high = np.quantile(forecast.draws[:, mask, k].mean(axis=1), INTERVAL, method="weibull")
+    return float(low), float(high)
 
 
 def _spearman(one: np.ndarray, other: np.ndarray) -> float:
