@@ -53,7 +53,7 @@ class Knows:
     def __init__(self, matrix):
         self.matrix = matrix
 
-    def __call__(self, births, niches):
+    def __call__(self, _births, _niches):
         return self
 
     def forecast(self, roots, generations, lineages, seed):
