@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from nichechain.core.checks import StepBound, check_numbers
 from nichechain.core.errors import NichechainError
-from nichechain.variation.noise import IndependentNoise, Noise, truncated
+from nichechain.variation.noise import IndependentNoise, MutationNoise, truncated
 
 Floats = NDArray[np.float64]
 # Of floats of any precision: that of float32 in a search, of others in a test.
@@ -71,7 +71,7 @@ class AdditiveMutation:
 
     Parameters
     ----------
-    noise : Noise
+    noise : MutationNoise
         ``noise(rng, n)`` gives n float64 values at scale 1.
     scale : float
         Factor on the noise, positive.
@@ -95,7 +95,7 @@ class AdditiveMutation:
     never leave the set.
     """
 
-    noise: Noise
+    noise: MutationNoise
     scale: float = 1.0
     bound: Bound | None = None
     layers: tuple[int, ...] = ()
@@ -131,7 +131,7 @@ class AdditiveMutation:
         return self.scale * np.repeat(self.layer_scales, self.layers)
 
 
-def check_bound(noise: Noise, bound: Bound | None) -> None:
+def check_bound(noise: MutationNoise, bound: Bound | None) -> None:
     """Check that noise can be bounded so.
 
     Raises
@@ -147,7 +147,11 @@ def check_bound(noise: Noise, bound: Bound | None) -> None:
 
 
 def add_noise(
-    parent: Genotype, rng: np.random.Generator, noise: Noise, scale: float | Floats, bound: Bound | None
+    parent: Genotype,
+    rng: np.random.Generator,
+    noise: MutationNoise,
+    scale: float | Floats,
+    bound: Bound | None,
 ) -> Genotype:
     """One child of a parent.
 
@@ -155,7 +159,7 @@ def add_noise(
     ----------
     parent : (P,) float array
     rng : numpy.random.Generator
-    noise : Noise
+    noise : MutationNoise
     scale : float or (P,) array
         Factor on the noise.
     bound : Bound, optional
