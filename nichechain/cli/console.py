@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
-    from nichechain.archive.build import BuildProgress
+    from nichechain.archive.building import BuildProgress
 
 Command = TypeVar("Command")
 

@@ -12,6 +12,7 @@ from collections.abc import Callable
 from nichechain.core.errors import NichechainError
 from nichechain.variation.additive import BOUND_KINDS, AdditiveMutation, Bound, Mutation
 from nichechain.variation.noise import BallNoise, CauchyNoise, GaussianNoise, MutationNoise, StudentTNoise
+from nichechain.variation.polynomial import PolynomialMutation
 from nichechain.variation.self_adaptive import SelfAdaptiveDomain, SelfAdaptiveMutation
 
 __all__ = [
@@ -19,6 +20,7 @@ __all__ = [
     "AdditiveMutation",
     "Bound",
     "Mutation",
+    "PolynomialMutation",
     "SelfAdaptiveDomain",
     "SelfAdaptiveMutation",
     "cauchy",

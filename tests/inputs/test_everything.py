@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import enum
 import importlib
 import inspect
 import pkgutil
@@ -42,47 +43,20 @@ CALLS: tuple[Call, ...] = sum(
     (),
 )
 
-# Modules without a list of names, whose functions are for users all the same.
-_OPEN = (
-    "archive.exports",
-    "archive.imported",
-    "archive.merge",
-    "chain.filters",
-    "chain.structure.classes",
-    "chain.structure.graph",
-    "chain.structure.passage",
-    "chain.structure.wormholes",
-    "evolvability.coverage",
-    "evolvability.reach",
-    "evolvability.visits",
-    "evolvability.where_to_sample",
-    "search.making",
-    "search.parents",
-    "validation.contrast",
-    "validation.grid_size",
-    "validation.held_out",
-    "validation.stability",
-    "variation.polynomial",
-)
+# Their options have a table of their own, tests/inputs/test_cli.py.
+_ELSEWHERE = ("nichechain.cli",)
 
 
 def _public() -> dict[str, Any]:
-    """Functions and classes that are for users, by where they were defined."""
+    """Functions and classes that packages have for users, by where they were defined."""
     found: dict[str, Any] = {}
-    for module in sorted(info.name for info in pkgutil.walk_packages(nichechain.__path__, "nichechain.")):
-        if module.startswith(("nichechain.cli", "nichechain.domains.engine", "nichechain.__main__")):
-            continue
-        loaded = importlib.import_module(module)
-        names = list(getattr(loaded, "__all__", ()))
-        if module.removeprefix("nichechain.") in _OPEN:
-            names += [
-                name
-                for name, value in vars(loaded).items()
-                if inspect.isfunction(value) and value.__module__ == module and name[0] != "_"
-            ]
-        for name in names:
+    packages = [info.name for info in pkgutil.walk_packages(nichechain.__path__, "nichechain.") if info.ispkg]
+    for package in ("nichechain", *sorted(set(packages) - set(_ELSEWHERE))):
+        loaded = importlib.import_module(package)
+        for name in loaded.__all__:
             value = getattr(loaded, name)
-            if inspect.isclass(value) or inspect.isfunction(value):
+            made_by_users = inspect.isclass(value) and not issubclass(value, (Exception, enum.Enum))
+            if made_by_users or inspect.isfunction(value):
                 found[f"{value.__module__}.{value.__qualname__}"] = value
     return found
 
