@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import tyro
 
 from nichechain.cli import console
+from nichechain.core.checks import check_at_least
 from nichechain.core.errors import NichechainError
 
 if TYPE_CHECKING:
@@ -106,13 +107,9 @@ def _check(command: Evolvability) -> None:
         if command.method != "exact":
             raise NichechainError(f"{wanted} is computed in closed form, not by {command.method}")
     for name in ("top", "offspring", "draws", "repeats"):
-        value = getattr(command, name)
-        if value is not None and value < 1:
-            raise NichechainError(f"--{name} is {value}, but must be at least 1")
-    for name in ("seed", "min_births"):
-        if getattr(command, name) < 0:
-            option = name.replace("_", "-")
-            raise NichechainError(f"--{option} is {getattr(command, name)}, but must not be negative")
+        if getattr(command, name) is not None:
+            check_at_least(1, **{f"--{name}": getattr(command, name)})
+    check_at_least(0, **{"--seed": command.seed, "--min-births": command.min_births})
 
 
 def _one(command: Evolvability, archive: Archive, chain: NicheChain) -> pd.DataFrame:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import tyro
 
 from nichechain.cli import console
+from nichechain.core.checks import check_at_least
 from nichechain.core.errors import NichechainError
 from nichechain.search.config import BuildConfig, MutationName
 
@@ -85,10 +86,7 @@ def run(arguments: Sequence[str]) -> int:
 
     check_sample_size(command.offspring)
     check_lengths(command.l, command.lineages)
-    for name in ("top", "min_births"):
-        if getattr(command, name) < 0:
-            option = name.replace("_", "-")
-            raise NichechainError(f"--{option} is {getattr(command, name)}, but must not be negative")
+    check_at_least(0, **{"--top": command.top, "--min-births": command.min_births})
     by = find_measure(command.by)
     if command.map is not None and command.map != _NO_MAPS:
         find_measures(command.map.split(","))

@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nichechain.chain.model import Matrix, NicheChain
-from nichechain.core.checks import check_whole
-from nichechain.core.errors import NichechainError
+from nichechain.core.checks import check_at_least, check_choice
 from nichechain.core.randomness import Purpose, keyed
 from nichechain.evolvability.coverage import check_lengths, expected_coverage, sampled_coverage
 from nichechain.evolvability.results import Evolvability
@@ -94,13 +93,6 @@ def check(
 ) -> None:
     """Refuse numbers out of range and unknown names."""
     check_lengths(l, lineages)
-    for name, value, allowed in (
-        ("method", method, get_args(Method)),
-        ("convention", convention, get_args(Convention)),
-    ):
-        if value not in allowed:
-            raise NichechainError(f"{name} is {value!r}, but must be one of {', '.join(allowed)}")
-    check_whole(repeats=repeats, draws=draws)
-    for name, number in (("repeats", repeats), ("draws", draws)):
-        if number < 1:
-            raise NichechainError(f"{name} is {number}, but at least 1 is needed")
+    check_choice("method", method, get_args(Method))
+    check_choice("convention", convention, get_args(Convention))
+    check_at_least(1, repeats=repeats, draws=draws)

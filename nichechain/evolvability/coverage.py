@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 from scipy.special import gammaln
 
-from nichechain.core.checks import as_whole, check_whole
+from nichechain.core.checks import as_whole, check_at_least, check_whole
 from nichechain.core.errors import NichechainError
 from nichechain.core.row_sampler import RowSampler
 
@@ -110,9 +110,7 @@ def visit_probabilities(
     """
     states = transition.shape[0]
     niches = _counted(counted, states)
-    check_whole(columns=columns)
-    if columns < 1:
-        raise NichechainError(f"columns is {columns}, but must be at least 1")
+    check_at_least(1, columns=columns)
     transition = _faster(transition)
     for start in range(0, niches, columns):
         targets = np.arange(start, min(start + columns, niches))
@@ -212,9 +210,7 @@ def sampled_coverage(
         If a number is below 1, or T has too many entries to walk by.
     """
     check_lengths(generations, lineages)
-    check_whole(repeats=repeats)
-    if repeats < 1:
-        raise NichechainError(f"repeats is {repeats}, but at least 1 is needed")
+    check_at_least(1, repeats=repeats)
     states = transition.shape[0]
     niches = _counted(counted, states)
     step = RowSampler(entries(transition))
@@ -294,11 +290,7 @@ def rarefied_coverage(counts: ArrayLike, size: int, *, counted: int | None = Non
 
 def check_lengths(generations: int, lineages: int) -> None:
     """Refuse a lineage without generations, none at all, and parts of one."""
-    check_whole(l=generations, lineages=lineages)
-    if generations < 1:
-        raise NichechainError(f"l is {generations}, but a lineage has at least 1 generation")
-    if lineages < 1:
-        raise NichechainError(f"lineages is {lineages}, but at least 1 is needed")
+    check_at_least(1, l=generations, lineages=lineages)
 
 
 def _sizes(lineages: ArrayLike) -> Ints:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nichechain.chain.model import NicheChain
-from nichechain.core.checks import check_numbers, check_whole
+from nichechain.core.checks import check_at_least, check_choice, check_positive
 from nichechain.core.errors import NichechainError
 from nichechain.core.randomness import Purpose, keyed
 from nichechain.evolvability.averaging import (
@@ -91,15 +91,10 @@ def genotype_evolvability(
     Source: the paper's procedure, steps 2 to 7.
     """
     check(l, lineages, method, convention, repeats, draws)
-    check_whole(offspring=offspring)
-    if offspring < 1:
-        raise NichechainError(f"offspring is {offspring}, but at least 1 is needed")
-    if first_generation not in get_args(FirstGeneration):
-        raise NichechainError(f"first_generation is {first_generation!r}, but must be posterior or empirical")
+    check_at_least(1, offspring=offspring)
+    check_choice("first_generation", first_generation, get_args(FirstGeneration))
     if strength is not None:
-        check_numbers(strength=strength)
-    if strength is not None and not (math.isfinite(strength) and strength > 0):
-        raise NichechainError(f"strength is {strength}, but must be a positive number")
+        check_positive(strength=strength)
     chain = archive.chain() if chain is None else chain
     counts = _offspring_counts(archive, elite, offspring, seed, executor)
     observed = int(counts.sum())

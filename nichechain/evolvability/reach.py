@@ -12,8 +12,7 @@ from scipy import sparse
 
 from nichechain.chain.model import NicheChain, Transition
 from nichechain.chain.operator import PooledTransition
-from nichechain.core.checks import check_whole
-from nichechain.core.errors import NichechainError
+from nichechain.core.checks import check_at_least, check_choice
 from nichechain.evolvability import DRAWS, Convention
 from nichechain.evolvability.coverage import check_lengths, visit_probabilities
 from nichechain.evolvability.returns import return_probabilities
@@ -209,10 +208,5 @@ def visit_probability(transition: Transition, first: Floats, steps: int) -> tupl
 
 def check_draws(convention: str, draws: int) -> None:
     """Refuse an unknown convention, or no draws at all."""
-    if convention not in get_args(Convention):
-        raise NichechainError(
-            f"convention is {convention!r}, but must be one of {', '.join(get_args(Convention))}"
-        )
-    check_whole(draws=draws)
-    if draws < 1:
-        raise NichechainError(f"draws is {draws}, but at least 1 is needed")
+    check_choice("convention", convention, get_args(Convention))
+    check_at_least(1, draws=draws)

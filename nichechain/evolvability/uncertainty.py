@@ -20,7 +20,7 @@ from nichechain.chain.estimators import with_posterior
 from nichechain.chain.families import counts_of_families, families_of
 from nichechain.chain.model import NicheChain
 from nichechain.chain.posterior import DirichletPosterior
-from nichechain.core.checks import check_numbers, check_whole
+from nichechain.core.checks import check_at_least, check_numbers
 from nichechain.core.errors import NichechainError
 from nichechain.core.randomness import Purpose, keyed
 from nichechain.evolvability.averaging import DRAWS, Convention
@@ -175,9 +175,7 @@ def bootstrap_elites(
     niche of m elites the spread is short by √((m − 1)/m), so a niche of one elite adds none.
     What the few draws of each resample leave open adds to the spread.
     """
-    check_whole(resamples=resamples)
-    if resamples < 2:
-        raise NichechainError(f"resamples is {resamples}, but must be at least 2")
+    check_at_least(2, resamples=resamples)
     if not len(counts.families):
         raise NichechainError(
             "these births do not say whose children they are, so elites cannot be resampled"

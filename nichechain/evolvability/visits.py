@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
 from nichechain.chain.model import NicheChain, Transition
-from nichechain.core.checks import as_floats, check_whole
+from nichechain.core.checks import as_floats, check_at_least
 from nichechain.core.errors import NichechainError
 from nichechain.core.randomness import Purpose, keyed
 from nichechain.core.row_sampler import RowSampler
@@ -116,9 +116,7 @@ def visit_metrics(
     """
     check_lengths(l, lineages)
     check_draws(convention, draws)
-    check_whole(repeats=repeats)
-    if repeats < 1:
-        raise NichechainError(f"repeats is {repeats}, but at least 1 is needed")
+    check_at_least(1, repeats=repeats)
     root = Root(chain, niche=niche, offspring=offspring)
     steps = generations(l, convention)
     size = repeats if chain.posterior is None else max(1, math.ceil(repeats / draws))

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from nichechain.chain.model import Matrix, NicheChain
-from nichechain.core.checks import check_whole
+from nichechain.core.checks import check_at_least, check_choice
 from nichechain.core.errors import NichechainError
 from nichechain.evolvability import DRAWS, Convention
 from nichechain.evolvability.coverage import check_lengths, expected_coverage
@@ -74,11 +74,8 @@ def where_to_sample(
     m / (m + e α), as the posterior mean of a Dirichlet row is linear in what is seen. Memory and
     time are those of dense (S, S) matrices.
     """
-    check_whole(births=births, draws=draws)
-    if births < 1:
-        raise NichechainError(f"births is {births}, but at least 1 is needed")
-    if draws < 2:
-        raise NichechainError(f"draws is {draws}, but at least 2 are needed")
+    check_at_least(1, births=births)
+    check_at_least(2, draws=draws)
     if chain.posterior is None or chain.counts is None:
         raise NichechainError(
             f"more births narrow nothing in a chain that is {chain.estimator}: "
@@ -147,10 +144,7 @@ def evolvability_derivative(
     l-evolvability itself, and as many products of dense matrices as there are generations.
     """
     check_lengths(l, lineages)
-    if convention not in get_args(Convention):
-        raise NichechainError(
-            f"convention is {convention!r}, but must be one of {', '.join(get_args(Convention))}"
-        )
+    check_choice("convention", convention, get_args(Convention))
     states, n = chain.states, chain.n_niches
     weight = _weight(chain, niche)
     matrix = chain.T

@@ -7,7 +7,7 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from nichechain.core.checks import as_floats
+from nichechain.core.checks import as_floats, check_choice
 from nichechain.core.errors import NichechainError
 
 Floats = NDArray[np.float64]
@@ -101,8 +101,7 @@ def check_bounds(bounds: Bounds) -> None:
 
 def check_outside(outside: str) -> None:
     """Refuse an unknown mode."""
-    if outside not in OUTSIDE_MODES:
-        raise NichechainError(f"outside is {outside!r}, but must be one of {', '.join(OUTSIDE_MODES)}")
+    check_choice("outside", outside, OUTSIDE_MODES)
 
 
 def checked_behavior(behavior: ArrayLike, axes: int) -> Floats:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nichechain.chain.model import NicheChain
-from nichechain.core.checks import check_whole
+from nichechain.core.checks import check_at_least
 from nichechain.core.errors import NichechainError
 from nichechain.evolvability.averaging import ENDLESS, SATURATED
 from nichechain.evolvability.coverage import coverage_by_generation
@@ -99,9 +99,7 @@ def plot_lineages(
     NichechainError
         As in :func:`plot_generations`.
     """
-    check_whole(most=most)
-    if most < 2:
-        raise NichechainError(f"most is {most}, but must be at least 2")
+    check_at_least(2, most=most)
     sizes = np.unique(np.round(np.geomspace(1, most, 17)).astype(np.int64))
     covered = _covered(chain, niches, l, np.append(sizes, ENDLESS), draws, seed)[:, :, -1]
     _lines(ax, chain, niches, sizes, covered[..., :-1], covered[..., -1:])
@@ -115,9 +113,7 @@ def _covered(
     """Coverage (draws, niches, generations, lineages)."""
     if not 1 <= len(niches) <= len(_COLORS):
         raise NichechainError(f"{len(niches)} niches are given, but one to {len(_COLORS)} can be told apart")
-    check_whole(draws=draws)
-    if draws < 1:
-        raise NichechainError(f"draws is {draws}, but at least 1 is needed")
+    check_at_least(1, draws=draws)
     roots = [chain.state(niche) for niche in niches]
     return np.array(
         [

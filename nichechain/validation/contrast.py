@@ -16,7 +16,7 @@ from nichechain.chain.base_measure import BaseMeasure
 from nichechain.chain.counts import TransitionCounts
 from nichechain.chain.empirical_bayes import design_effect, most_likely
 from nichechain.chain.posterior import DirichletPosterior
-from nichechain.core.checks import check_whole
+from nichechain.core.checks import check_at_least
 from nichechain.core.errors import NichechainError
 from nichechain.core.randomness import Purpose, keyed
 from nichechain.evolvability.coverage import check_lengths, expected_coverage, rarefied_coverage
@@ -140,14 +140,9 @@ def contrast(
     times Student's quantile, and for few runs r the spread is corrected by √(r/(r − 1)).
     """
     check_lengths(l, lineages)
-    check_whole(resamples=resamples, draws=draws, min_births=min_births)
-    for name, number, least in (
-        ("resamples", resamples, 2),
-        ("draws", draws, 1),
-        ("min_births", min_births, 0),
-    ):
-        if number < least:
-            raise NichechainError(f"{name} is {number}, but must be at least {least}")
+    check_at_least(2, resamples=resamples)
+    check_at_least(1, draws=draws)
+    check_at_least(0, min_births=min_births)
     sides = _Side.of(first, niches), _Side.of(second, niches)
     whole = [side.counts() for side in sides]
     enough = [counts.births[: len(niches)] >= max(1, min_births) for counts in whole]

@@ -18,8 +18,7 @@ from scipy import stats
 
 from nichechain.births.table import NONE
 from nichechain.chain.model import Matrix, NicheChain
-from nichechain.core.checks import check_whole
-from nichechain.core.errors import NichechainError
+from nichechain.core.checks import check_at_least
 from nichechain.core.randomness import Purpose, keyed
 from nichechain.evolvability.coverage import expected_coverage, rarefied_coverage
 from nichechain.niches import Niches
@@ -173,9 +172,7 @@ def compare(
     NichechainError
         If ``draws`` is below 1.
     """
-    check_whole(draws=draws)
-    if draws < 1:
-        raise NichechainError(f"draws is {draws}, but at least 1 is needed")
+    check_at_least(1, draws=draws)
     roots, size, generations = lineages.states.shape
     n = chain.n_niches
     counts = np.stack([np.bincount(row[row != NONE], minlength=chain.states) for row in lineages.offspring])

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from nichechain.births.table import NONE
 from nichechain.chain import NicheChain, TransitionCounts, estimate
 from nichechain.chain.families import counts_of_families, families_of
-from nichechain.core.checks import as_floats, check_whole
+from nichechain.core.checks import as_floats, check_at_least, check_whole
 from nichechain.core.errors import NichechainError
 from nichechain.core.randomness import Purpose, keyed
 from nichechain.evolvability import l_evolvability
@@ -217,9 +217,8 @@ def sweep(
     if not sizes:
         raise NichechainError("there are no sizes: give at least one, such as 20")
     check_lengths(l, lineages)
-    check_whole(min_births=min_births, draws=draws, folds=folds)
-    if folds < 2:
-        raise NichechainError(f"folds is {folds}, but at least 2 are needed")
+    check_whole(min_births=min_births, draws=draws)
+    check_at_least(2, folds=folds)
     for size in sizes:
         if not isinstance(size, Sequence):
             check_whole(size=size)

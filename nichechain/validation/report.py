@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from nichechain.archive.archive import Archive
-from nichechain.core.checks import check_seed, check_whole
+from nichechain.core.checks import check_at_least, check_seed, check_whole
 from nichechain.core.errors import NichechainError
 from nichechain.execution import Executor
 from nichechain.validation import chapman_kolmogorov
@@ -55,10 +55,7 @@ class ValidationConfig:
 
     def __post_init__(self) -> None:
         check_whole(elites=self.elites)
-        for name in ("lineages", "l", "offspring"):
-            check_whole(**{name: getattr(self, name)})
-            if getattr(self, name) < 1:
-                raise NichechainError(f"{name} is {getattr(self, name)}, but must be at least 1")
+        check_at_least(1, lineages=self.lineages, l=self.l, offspring=self.offspring)
         if self.elites < 3:
             raise NichechainError(f"elites is {self.elites}, but a rank correlation needs at least 3")
         check_seed(self.seed)

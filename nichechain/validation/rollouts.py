@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from nichechain.archive.archive import Archive
 from nichechain.births.table import NONE
 from nichechain.chain.model import NicheChain
-from nichechain.core.checks import check_whole
+from nichechain.core.checks import check_at_least, check_whole
 from nichechain.core.errors import NichechainError
 from nichechain.core.randomness import Purpose, keyed
 from nichechain.evolvability import niche_evolvability
@@ -159,9 +159,7 @@ def run_lineages(
         If a number is out of range or a niche is empty.
     """
     check_lengths(l, lineages)
-    check_whole(offspring=offspring)
-    if offspring < 1:
-        raise NichechainError(f"offspring is {offspring}, but at least 1 is needed")
+    check_at_least(1, offspring=offspring)
     elites = [archive.elite(int(root)).genotype for root in roots]
     mutate, niches = archive.mutate, archive.niches
 

@@ -13,7 +13,7 @@ from scipy.stats import spearmanr
 
 from nichechain.chain.counts import TransitionCounts
 from nichechain.chain.estimators import Estimator, estimate
-from nichechain.core.checks import as_floats, check_seed, check_whole
+from nichechain.core.checks import as_floats, check_at_least, check_choice
 from nichechain.core.errors import NichechainError
 from nichechain.core.randomness import Purpose, keyed
 from nichechain.evolvability import niche_evolvability
@@ -160,14 +160,9 @@ def rank_stability(
     parts = np.sort(np.atleast_1d(as_floats("fractions", fractions)), axis=None)
     if not parts.size or not ((parts > 0) & (parts < 1)).all():
         raise NichechainError(f"fractions are {tuple(parts.tolist())}, but must be between 0 and 1")
-    if thin not in get_args(Thin):
-        raise NichechainError(f"thin is {thin!r}, but must be one of {', '.join(get_args(Thin))}")
-    check_whole(repeats=repeats, min_births=min_births)
-    check_seed(seed)
-    if min_births < 0:
-        raise NichechainError(f"min_births is {min_births}, but must not be negative")
-    if repeats < 1:
-        raise NichechainError(f"repeats is {repeats}, but at least 1 is needed")
+    check_choice("thin", thin, get_args(Thin))
+    check_at_least(1, repeats=repeats)
+    check_at_least(0, min_births=min_births, seed=seed)
     ranked = np.flatnonzero(counts.births[: len(counts.niches)] >= min_births)
     if ranked.size < _FEWEST_NICHES:
         raise NichechainError(

@@ -8,7 +8,7 @@ from typing import Any, Literal, Protocol, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from nichechain.core.checks import check_numbers
+from nichechain.core.checks import check_choice, check_positive
 from nichechain.core.errors import NichechainError
 from nichechain.variation.noise import IndependentNoise, Noise, truncated
 
@@ -57,13 +57,8 @@ class Bound:
     size: float
 
     def __post_init__(self) -> None:
-        if self.kind not in BOUND_KINDS:
-            raise NichechainError(
-                f"step bound is of kind {self.kind!r}, but must be one of {', '.join(BOUND_KINDS)}"
-            )
-        check_numbers(step_bound=self.size)
-        if not (np.isfinite(self.size) and self.size > 0):
-            raise NichechainError(f"step bound is {self.size:g}, but must be a positive number")
+        check_choice("kind of step bound", self.kind, BOUND_KINDS)
+        check_positive(step_bound=self.size)
 
 
 @dataclass(frozen=True)
@@ -103,18 +98,14 @@ class AdditiveMutation:
     layer_scales: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
-        check_numbers(mutation_scale=self.scale)
-        if not (np.isfinite(self.scale) and self.scale > 0):
-            raise NichechainError(f"mutation scale is {self.scale}, but must be a positive number")
+        check_positive(scale=self.scale)
         if len(self.layers) != len(self.layer_scales):
             raise NichechainError(
                 f"layer scales are {_listed(self.layer_scales)}, but there are {len(self.layers)} layers "
                 f"({_listed(self.layers)} weights): one scale per layer"
             )
         for scale in self.layer_scales:
-            check_numbers(layer_scale=scale)
-            if not (np.isfinite(scale) and scale > 0):
-                raise NichechainError(f"layer scale is {scale:g}, but must be a positive number")
+            check_positive(layer_scale=scale)
         check_bound(self.noise, self.bound)
 
     def __call__(self, parent: Genotype, rng: np.random.Generator) -> Genotype:

@@ -12,7 +12,7 @@ import numpy as np
 from nichechain.archive import read
 from nichechain.archive.archive import Archive, load
 from nichechain.births.table import Offspring
-from nichechain.core.checks import check_seed, check_whole
+from nichechain.core.checks import check_at_least, check_seed
 from nichechain.core.errors import NichechainError
 from nichechain.core.machine import library_versions, machine
 from nichechain.core.randomness import Purpose, keyed
@@ -87,9 +87,7 @@ def verify(
     with probability 1 - C(N - k, n) / C(N, n), about 1 - (1 - n/N)^k.
     """
     if sample is not None:
-        check_whole(sample=sample)
-    if sample is not None and sample < 0:
-        raise NichechainError(f"sample is {sample}, but must not be negative")
+        check_at_least(0, sample=sample)
     check_seed(seed)
     archive = archive if isinstance(archive, Archive) else load(archive)
     with ExitStack() as stack:

@@ -193,10 +193,10 @@ def test_a_distribution_over_niches_alone_leaves_nothing_outside():
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"l": 0}, "l is 0, but a lineage has at least 1 generation"),
+        ({"l": 0}, "l is 0, but must be at least 1"),
         ({"l": -2}, "l is -2"),
         ({"l": 1.5}, "l is 1.5"),
-        ({"lineages": 0}, "lineages is 0, but at least 1 is needed"),
+        ({"lineages": 0}, "lineages is 0, but must be at least 1"),
         ({"lineages": -1}, "lineages is -1"),
         ({"lineages": 2.5}, "lineages is 2.5"),
         ({"method": "exactly"}, "method is 'exactly', but must be one of exact, monte-carlo"),
@@ -477,7 +477,10 @@ def test_a_genotype_by_monte_carlo_agrees_with_exact(plane_chain):
         ({"offspring": 0}, "offspring is 0"),
         ({"l": 0}, "l is 0"),
         ({"lineages": 0}, "lineages is 0"),
-        ({"first_generation": "guess"}, "first_generation is 'guess', but must be posterior or empirical"),
+        (
+            {"first_generation": "guess"},
+            "'guess', but must be one of posterior, empirical",
+        ),
         ({"method": "fast"}, "method is 'fast'"),
     ],
 )

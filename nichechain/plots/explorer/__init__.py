@@ -22,7 +22,7 @@ from scipy import sparse
 from nichechain.chain.displacement import GridDisplacement
 from nichechain.chain.structure.graph import LONG_JUMP
 from nichechain.chain.structure.wormholes import wormholes
-from nichechain.core.checks import check_whole
+from nichechain.core.checks import check_at_least
 from nichechain.core.errors import NichechainError
 from nichechain.evolvability.coverage import check_lengths, coverage_by_generation
 from nichechain.evolvability.roots import transition_draws
@@ -187,9 +187,7 @@ def explorer_page(
         raise NichechainError(f"l is {l}, but the page goes up to {LONGEST} generations")
     if lineages > _MOST_LINEAGES:
         raise NichechainError(f"lineages is {lineages}, but the page goes up to {_MOST_LINEAGES}")
-    check_whole(draws=draws)
-    if draws < 1:
-        raise NichechainError(f"draws is {draws}, but at least 1 is needed")
+    check_at_least(1, draws=draws)
     axes = len(archive.meta.facts.behavior_names)
     if axes != 2:
         raise NichechainError(f"behavior has {axes} axes, but the page is a map over 2")
