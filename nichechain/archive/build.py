@@ -124,7 +124,7 @@ def build(
         try:
             while search.births < config.evaluations:
                 failures.check(
-                    f"{folder} keeps them, and --resume with a larger --max-failed goes on from there"
+                    f"{folder} keeps them, and a build with a larger max_failed goes on from there"
                 )
                 first = search.births == 0
                 rows = search.advance(executor, config.evaluations - search.births, tell)

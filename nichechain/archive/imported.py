@@ -210,7 +210,7 @@ def _nothing_to_go_on_with(number: int, dimensions: int) -> SearchState:
     whole, real = np.empty(0, np.int64), np.empty(0)
     none = np.empty((0, 0), np.float32)
     elites = Elites(whole, none, np.empty((0, dimensions)), real, real, whole, whole)
-    return SearchState(elites, Offspring(none, whole, whole, whole, whole), number, 0)
+    return SearchState(elites, Offspring.none(0), number, 0)
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,8 @@ import os
 from contextlib import suppress
 from pathlib import Path
 
+from nichechain.core.errors import NichechainError
+
 
 def write_atomically(path: Path, content: bytes) -> None:
     """Write a file so that whoever reads it finds the whole of it, even after a crash.
@@ -28,12 +30,26 @@ def write_atomically(path: Path, content: bytes) -> None:
             file.flush()
             os.fsync(file.fileno())
         part.replace(path)
-    except OSError:
+    except BaseException:
         # Half a file is of no use, and a full disk needs the room.
         with suppress(OSError):
             part.unlink(missing_ok=True)
         raise
     sync_folder(path.parent)
+
+
+def replace_file(path: str | Path, content: bytes) -> None:
+    """:func:`write_atomically` for a file that somebody named.
+
+    Raises
+    ------
+    NichechainError
+        If it cannot be written; what it held is then still there.
+    """
+    try:
+        write_atomically(Path(path), content)
+    except OSError as error:
+        raise NichechainError(f"{path} cannot be written: {error.strerror}") from error
 
 
 def sync_folder(folder: Path) -> None:

@@ -17,8 +17,8 @@ from nichechain.core.checks import check_choice
 from nichechain.core.errors import NichechainError
 from nichechain.domains.base import Evaluation
 from nichechain.niches import Niches
+from nichechain.niches.ribs import niches_of
 from nichechain.pyribs.strategies import StrategyParent, centre, is_strategy
-from nichechain.pyribs.translation import niches_of
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -319,7 +319,7 @@ class Recording:
         )
         accepted = _one_by_one(cell, objective, entered)
         self._tables.append(
-            births.table(offspring, evaluation, child_niche=state, accepted=accepted, step=self._step)
+            births.make_table(offspring, evaluation, child_niche=state, accepted=accepted, step=self._step)
         )
 
     def _states(self, measures: NDArray[Any], cell: Ints) -> Ints:

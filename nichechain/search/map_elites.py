@@ -72,7 +72,7 @@ class MapElites:
         self._config = config
         self._mutate = mutate
         self._archive = EliteArchive(domain, niches)
-        self._pending = _no_offspring(domain.genotype_length)
+        self._pending = Offspring.none(domain.genotype_length)
         self.births = 0
         self.step = -1
         self.settled = True
@@ -188,7 +188,7 @@ class MapElites:
         accepted[fine] = self._archive.add(candidates[fine])
         if self._config.selection == "curiosity":
             self._curiosity.tell(offspring.parent_uid, accepted)
-        return births.table(offspring, evaluation, child_niche=niche, accepted=accepted, step=self.step)
+        return births.make_table(offspring, evaluation, child_niche=niche, accepted=accepted, step=self.step)
 
     def _keys(self, uid: NDArray[np.int64], objective: NDArray[np.float64]) -> NDArray[np.float64]:
         """The key of each birth; the largest of a niche makes its elite."""
@@ -204,8 +204,3 @@ class MapElites:
                 return uid.astype(np.float64)
             case "objective":
                 return objective
-
-
-def _no_offspring(length: int) -> Offspring:
-    none = np.empty(0, np.int64)
-    return Offspring(np.empty((0, length), np.float32), none, none, none, none)

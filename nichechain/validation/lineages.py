@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from nichechain.births.table import NONE
+from nichechain.births.table import NONE, check_columns
 from nichechain.core.errors import NichechainError
 
 Ints = NDArray[np.int64]
@@ -58,9 +58,7 @@ class Triples:
         NichechainError
             If a column is missing, or the birth of a parent is.
         """
-        missing = [name for name in _COLUMNS if name not in births.columns]
-        if missing:
-            raise NichechainError(f"births have no column {missing[0]}, which lineages are joined by")
+        check_columns(births, *_COLUMNS)
         run, uid, parent, depth, parent_niche, child_niche, step = (
             births[name].fillna(NONE).to_numpy(np.int64) for name in _COLUMNS
         )

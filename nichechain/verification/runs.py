@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from nichechain.archive.read import Meta
 from nichechain.births.table import NONE
+from nichechain.core.columns import Columnar
 from nichechain.domains.base import Evaluation
 from nichechain.search.config import BuildConfig
 
@@ -20,7 +21,7 @@ Bools = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
-class Births:
+class Births(Columnar):
     """Columns of :mod:`nichechain.births.table`, ``NONE`` and NaN for null.
 
     Parameters
@@ -75,18 +76,6 @@ class Births:
             failed=table["failed"].is_valid().to_numpy().astype(bool),
             reasons=np.array(table["failed"].fill_null("").to_pylist(), object),
         )
-
-    def __len__(self) -> int:
-        return len(self.uid)
-
-    def __getitem__(self, rows: slice | Ints | Bools) -> Births:
-        return Births(*(getattr(self, name)[rows] for name in self.__dataclass_fields__))
-
-    @staticmethod
-    def concatenate(parts: Sequence[Births]) -> Births:
-        """The rows of several, in order."""
-        names = Births.__dataclass_fields__
-        return Births(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
 
     @property
     def evaluation(self) -> Evaluation:

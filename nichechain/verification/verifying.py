@@ -190,7 +190,7 @@ class _Work:
             self.checks.append(Check(f"the search can be made again ({error})", "search", 1, 1))
             return
         self.checks += check_search(births, Births.concatenate([again.births for again in made]))
-        winners = _winners([again.state.elites for again in made])
+        winners = Elites.concatenate([again.state.elites for again in made]).winners()
         self.checks += check_winners(self.archive.elites, winners)
         if self.archive.meta.origin is None:
             self.checks += check_pending_again(pending, made[0].state.pending)
@@ -267,13 +267,3 @@ def _check_domain(archive: Archive, domain: Domain) -> Check:
         apart,
         EVALUATION,
     )
-
-
-def _winners(elites: list[Elites]) -> Elites:
-    """Of every niche, the elite with the largest key among runs; of equal keys, that of the first."""
-    pooled = elites[0]
-    for more in elites[1:]:
-        pooled = Elites.concatenate(pooled, more)
-    pooled = pooled[np.lexsort((pooled.uid, -pooled.key, pooled.niche))]
-    _, first = np.unique(pooled.niche, return_index=True)
-    return pooled[first]

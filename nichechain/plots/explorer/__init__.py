@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import base64
 import json
-import os
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
@@ -24,6 +23,7 @@ from nichechain.chain.structure.graph import LONG_JUMP
 from nichechain.chain.structure.wormholes import wormholes
 from nichechain.core.checks import check_at_least
 from nichechain.core.errors import NichechainError
+from nichechain.core.files import write_atomically
 from nichechain.evolvability.coverage import check_lengths, coverage_by_generation
 from nichechain.evolvability.roots import transition_draws
 from nichechain.niches import GridNiches
@@ -161,15 +161,7 @@ def write_explorer(
         If a number is out of range, behavior does not have two axes, or there are too many niches.
     """
     text = explorer_page(archive, chain, l=l, lineages=lineages, draws=draws, seed=seed)
-    part = out.with_name(out.name + ".tmp")
-    try:
-        with part.open("w", encoding="utf-8", newline="\n") as file:
-            file.write(text)
-            file.flush()
-            os.fsync(file.fileno())
-        part.replace(out)
-    finally:
-        part.unlink(missing_ok=True)
+    write_atomically(out, text.encode())
 
 
 def explorer_page(
