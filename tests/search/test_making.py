@@ -96,7 +96,7 @@ def test_layers_of_a_module_follow_the_order_of_its_genotype():
         ),
         ({"df": 2.0}, PlanarArm(), "only student-t has"),
         ({"step_bound": ("rescaled", -1)}, PlanarArm(), "step_bound is -1"),
-        ({"step_bound": ("cube", 1)}, PlanarArm(), "kind 'cube'"),
+        ({"step_bound": ("cube", 1)}, PlanarArm(), "kind of step bound is 'cube'"),
         ({"mutation": "levy"}, PlanarArm(), "mutation is 'levy'"),
     ],
 )

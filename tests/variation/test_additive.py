@@ -118,7 +118,10 @@ def test_a_cube_is_the_same_in_every_layer():
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: Bound("sphere", 1.0), "kind 'sphere', but must be one of per-coordinate, rescaled"),
+        (
+            lambda: Bound("sphere", 1.0),
+            "kind of step bound is 'sphere', but must be one of per-coordinate, rescaled",
+        ),
         (lambda: Bound("rescaled", 0.0), "step_bound is 0.0, but must be a positive number"),
         (lambda: Bound("rescaled", math.inf), "step_bound is inf"),
         (lambda: Bound("per-coordinate", math.nan), "step_bound is nan"),
