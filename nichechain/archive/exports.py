@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
-from nichechain.births.table import check_columns
-from nichechain.core.errors import NichechainError
+from nichechain.births.joins import across_runs, parent_rows
+from nichechain.births.table import NONE, check_columns
 from nichechain.core.files import replace_file
 from nichechain.niches import Niches
 
@@ -253,22 +253,13 @@ def _dot_value(value: Any) -> str:
 
 def _numbered(births: pd.DataFrame) -> tuple[list[int], list[int | None]]:
     """One number for each birth of all runs, and that of its parent."""
-    run = births["run"].to_numpy(np.int64)
-    uid = births["uid"].to_numpy(np.int64)
-    parent = births["parent_uid"].astype("Int64")
-    runs, which = np.unique(run, return_inverse=True)
-    sizes = [uid[which == k].max() + 1 for k in range(runs.size)]
-    offset = np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)[which]
-    number = (uid + offset).tolist()
-    parents = [
-        None if before is pd.NA else int(before) + int(shift)
-        for before, shift in zip(parent.tolist(), offset.tolist(), strict=True)
-    ]
-    known = set(number)
-    for own, before in zip(number, parents, strict=True):
-        if before is not None and before not in known:
-            raise NichechainError(f"birth {own} has parent {before}, but there is no such birth")
-    return number, parents
+    run, uid, parent_uid = (
+        births[name].fillna(NONE).to_numpy(np.int64) for name in ("run", "uid", "parent_uid")
+    )
+    # Refuses a parent that is not there.
+    parent_rows(run, uid, parent_uid)
+    number, parents = across_runs(run, uid, parent_uid)
+    return number.tolist(), [None if parent == NONE else parent for parent in parents.tolist()]
 
 
 def _csv(names: Sequence[str], rows: Iterable[Sequence[Any]], separator: str = ",") -> bytes:

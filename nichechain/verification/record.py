@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from nichechain.births.joins import repeated
 from nichechain.births.table import NONE, Offspring
 from nichechain.niches import Niches
 from nichechain.search.elites import Elites
@@ -55,11 +56,7 @@ def check_values(births: Births, niches: Niches) -> list[Check]:
 
 def check_unique(births: Births) -> list[Check]:
     """Whether no uid occurs twice in a run."""
-    pairs = np.stack([births.run, births.uid])
-    _, first = np.unique(pairs, axis=1, return_index=True)
-    again = np.ones(len(births), bool)
-    again[first] = False
-    return [Check.of("uids are unique", _GROUP, again, births.uid)]
+    return [Check.of("uids are unique", _GROUP, repeated(births.run, births.uid), births.uid)]
 
 
 def check_runs(runs: list[Run], births: int) -> Check:
