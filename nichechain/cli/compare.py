@@ -31,7 +31,7 @@ class Compare:
     """Archive folder, or the name of an archive that ships with nichechain."""
     second: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="B")]
     """Another: operators, seeds, searches or domains may differ, niches not."""
-    l: int = 5  # noqa: E741  # the paper's name
+    l: int = 5
     """Generations to look ahead."""
     lineages: int = 100
     """Independent lineages U: l times U descendants."""
@@ -52,10 +52,10 @@ def run(arguments: Sequence[str]) -> int:
     command = console.parse(Compare, arguments)
     from nichechain.archive import read
     from nichechain.archive.archive import load
-    from nichechain.evolvability.coverage import check_lengths
+    from nichechain.evolvability.question import Question
     from nichechain.validation.contrast import contrast
 
-    check_lengths(command.l, command.lineages)
+    Question(command.l, command.lineages)
     check_at_least(0, **{"--seed": command.seed})
     archives = load(command.first), load(command.second)
     if archives[0].niches != archives[1].niches:

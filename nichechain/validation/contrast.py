@@ -20,7 +20,8 @@ from nichechain.chain.posterior import DirichletPosterior
 from nichechain.core.checks import check_at_least
 from nichechain.core.errors import NichechainError
 from nichechain.core.randomness import Purpose, keyed
-from nichechain.evolvability.coverage import check_lengths, expected_coverage, rarefied_coverage
+from nichechain.evolvability.coverage import expected_coverage, rarefied_coverage
+from nichechain.evolvability.question import Question
 from nichechain.niches import Niches
 
 Floats = NDArray[np.float64]
@@ -80,7 +81,7 @@ class Contrast:
     niches: int
     clusters: tuple[tuple[str, int], tuple[str, int]]
     births: int
-    l: int  # noqa: E741  # the paper's name
+    l: int
     lineages: int
     min_births: int
     resamples: int
@@ -95,7 +96,7 @@ def contrast(
     second: pa.Table,
     niches: Niches,
     *,
-    l: int = 5,  # noqa: E741
+    l: int = 5,
     lineages: int = 100,
     min_births: int = 20,
     resamples: int = 100,
@@ -140,9 +141,8 @@ def contrast(
     every figure, so only their spread is used: the interval is the difference ± its standard error
     times Student's quantile, and for few runs r the spread is corrected by √(r/(r − 1)).
     """
-    check_lengths(l, lineages)
+    question = Question(l, lineages, draws=draws, seed=seed)
     check_at_least(2, resamples=resamples)
-    check_at_least(1, draws=draws)
     check_at_least(0, min_births=min_births)
     sides = _Side.of(first, niches), _Side.of(second, niches)
     whole = [side.counts() for side in sides]
@@ -161,11 +161,12 @@ def contrast(
         def figures(counts: TransitionCounts, draws: int, rng: np.random.Generator) -> Floats:
             base = BaseMeasure.pooled(counts, weights)  # noqa: B023  # called in this round only
             posterior = DirichletPosterior(counts, base, strength, effect)  # noqa: B023
-            lineages_of = [lineages, 1]
             found = np.zeros(2)
             for _ in range(draws):
                 T = posterior.draw(rng)
-                covered = expected_coverage(T, T[compared], l, lineages_of, counted=len(niches))
+                covered = expected_coverage(
+                    T, T[compared], question.steps, [lineages, 1], counted=len(niches)
+                )
                 found += covered.mean(axis=0) / draws
             visits = counts.visits
             return np.append(
