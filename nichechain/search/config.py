@@ -9,6 +9,7 @@ from typing import Any, Literal, get_args
 
 from nichechain.core.checks import (
     DomainOption,
+    StepBound,
     as_bounds,
     as_shape,
     check_at_least,
@@ -17,7 +18,6 @@ from nichechain.core.checks import (
     plain_options,
 )
 from nichechain.core.errors import NichechainError
-from nichechain.variation.additive import StepBound
 
 Replacement = Literal["random", "first", "newest", "objective"]
 Outside = Literal["state", "absorb", "clip"]
