@@ -214,9 +214,7 @@ def test_missing_columns_and_parents(tmp_path):
         with pytest.raises(NichechainError, match="births have no column run"):
             write(births.drop(columns="run"))
     for write in (lambda frame: write_phylogeny(frame, NICHES, tmp_path / "a"), genealogy):
-        with pytest.raises(
-            NichechainError, match="birth 2 of run 0 has parent 1, but there is no such"
-        ):
+        with pytest.raises(NichechainError, match="birth 2 of run 0 has parent 1, but there is no such"):
             write(births.drop(index=1))
     assert list(tmp_path.iterdir()) == []
 
