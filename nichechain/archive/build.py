@@ -12,7 +12,7 @@ import pyarrow as pa
 
 from nichechain.archive import read, write
 from nichechain.core.errors import ArchiveError
-from nichechain.core.locking import writing
+from nichechain.core.files import writing
 from nichechain.domains.base import Domain
 from nichechain.execution import Executor
 from nichechain.search.config import MOST_FAILED, BuildConfig

@@ -17,7 +17,7 @@ from nichechain.archive import read, write
 from nichechain.births.joins import repeated
 from nichechain.births.table import NONE, Offspring
 from nichechain.core.errors import ArchiveError, NichechainError
-from nichechain.core.locking import writing
+from nichechain.core.files import writing
 from nichechain.niches import Niches
 from nichechain.search.config import BuildConfig
 from nichechain.search.elites import Elites, SearchState

@@ -13,7 +13,7 @@ import pyarrow.compute as pc
 from nichechain.archive import read, write
 from nichechain.births.table import Offspring
 from nichechain.core.errors import ArchiveError, NichechainError
-from nichechain.core.locking import writing
+from nichechain.core.files import writing
 from nichechain.niches import Niches
 from nichechain.search.config import BuildConfig
 from nichechain.search.elites import Elites, SearchState

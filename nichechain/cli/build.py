@@ -119,7 +119,7 @@ class Build:
         from nichechain import domains
         from nichechain.niches import parse_bounds, parse_niches, parse_shape
         from nichechain.search.making import check_niches, make_mutation
-        from nichechain.variation.parsing import parse_layer_scales, parse_step_bound
+        from nichechain.variation.additive import parse_layer_scales, parse_step_bound
 
         if self.grid is not None and self.niches is not None:
             raise NichechainError(
@@ -226,7 +226,7 @@ def run(arguments: Sequence[str]) -> int:
     from nichechain.archive import read, write
     from nichechain.archive.build import build
     from nichechain.archive.trust import check_trusted
-    from nichechain.core.locking import writing
+    from nichechain.core.files import writing
     from nichechain.search.making import make_domain
 
     here = str(Path.cwd())

@@ -162,7 +162,7 @@ def _check_out(out: Path) -> None:
 
 def _config(command: LandscapeCommand, archive: Archive) -> BuildConfig:
     """The archive's configuration, with the mutation that is asked for."""
-    from nichechain.variation.parsing import parse_step_bound
+    from nichechain.variation.additive import parse_step_bound
 
     config = archive.config
     if command.mutation is not None and command.mutation != config.mutation:

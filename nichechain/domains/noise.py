@@ -17,8 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from nichechain.core.checks import check_at_least, check_numbers, check_positive
 from nichechain.core.errors import NichechainError
-from nichechain.domains.base import Domain, Evaluation, check_genotypes
-from nichechain.domains.wrapper import Wrapper
+from nichechain.domains.base import Domain, Evaluation, Wrapper, check_genotypes
 
 Floats = NDArray[np.float64]
 Seeds = NDArray[np.int64]

@@ -13,7 +13,7 @@ from nichechain.core.errors import NichechainError
 from nichechain.core.randomness import Purpose, keyed
 from nichechain.studies.initialisation import check_scheme
 from nichechain.variation import Mutation
-from nichechain.variation.parsing import parse_step_bound
+from nichechain.variation.additive import parse_step_bound
 from nichechain.walks import (
     BetterThanParent,
     Selection,

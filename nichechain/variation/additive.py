@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Protocol, get_args
+from typing import Any, Protocol, cast, get_args, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
 from nichechain.core.checks import StepBound, check_choice, check_positive
 from nichechain.core.errors import NichechainError
+from nichechain.domains.base import Domain, Wrapper
 from nichechain.variation.noise import IndependentNoise, Noise, truncated
 
 Floats = NDArray[np.float64]
@@ -182,3 +183,78 @@ def _rounded(parent: Genotype, step: Floats, limit: Floats) -> Genotype:
 
 def _listed(values: tuple[float, ...]) -> str:
     return ", ".join(f"{value:g}" for value in values) or "none"
+
+
+@runtime_checkable
+class Layered(Protocol):
+    """A domain or controller whose genotype is made of layers."""
+
+    @property
+    def layers(self) -> tuple[int, ...]:
+        """Evolved parameters of each layer, in the order of the genotype."""
+        ...
+
+
+def layers_of(domain: Domain) -> tuple[int, ...]:
+    """Evolved parameters of each layer of a domain's controller.
+
+    A domain tells its layers by a property ``layers``, or by a ``network`` that has one, such as
+    :class:`nichechain.domains.policies.controllers.MLP`.
+
+    Raises
+    ------
+    NichechainError
+        If it has no layers, or they do not make up its genotype.
+    """
+    told: object = domain
+    while isinstance(told, Wrapper):
+        told = told.domain
+    if not isinstance(told, Layered):
+        told = getattr(told, "network", None)
+    if not isinstance(told, Layered):
+        raise NichechainError(f"{domain.name} has no layers, so it takes one scale and no layer scales")
+    layers = tuple(int(size) for size in told.layers)
+    if sum(layers) != domain.genotype_length:
+        raise NichechainError(
+            f"the layers of {domain.name} have {sum(layers)} parameters together, "
+            f"but its genotypes have {domain.genotype_length}"
+        )
+    return layers
+
+
+def parse_step_bound(text: str, name: str = "step_bound") -> tuple[StepBound, float]:
+    """``"per-coordinate:2"`` as ``("per-coordinate", 2.0)``.
+
+    Raises
+    ------
+    NichechainError
+        If the text is no such thing.
+    """
+    kind, _, size = text.partition(":")
+    try:
+        bound = Bound(cast(StepBound, kind), float(size))
+    except (ValueError, NichechainError):
+        raise NichechainError(
+            f"{name} is {text!r}, but must be per-coordinate:SIZE or rescaled:SIZE with a positive "
+            "size, such as per-coordinate:2"
+        ) from None
+    return bound.kind, bound.size
+
+
+def parse_layer_scales(text: str, name: str = "layer_scales") -> tuple[float, ...]:
+    """``"1,0.5,0.5"`` as ``(1.0, 0.5, 0.5)``.
+
+    Raises
+    ------
+    NichechainError
+        If the text is no such thing.
+    """
+    try:
+        scales = tuple(float(part) for part in text.split(","))
+    except ValueError:
+        scales = ()
+    if not scales or not all(0 < scale < float("inf") for scale in scales):
+        raise NichechainError(
+            f"{name} is {text!r}, but must be positive numbers, one per layer, such as 1,0.5,0.5"
+        )
+    return scales

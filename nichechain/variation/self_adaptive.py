@@ -14,8 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from nichechain.core.checks import check_positive, check_whole
 from nichechain.core.errors import NichechainError
-from nichechain.domains.base import Domain, Evaluation, check_genotypes
-from nichechain.domains.wrapper import Wrapper
+from nichechain.domains.base import Domain, Evaluation, Wrapper, check_genotypes
 from nichechain.variation.additive import Bound, Genotype, add_noise, check_bound
 from nichechain.variation.noise import Noise
 

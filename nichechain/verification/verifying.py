@@ -22,10 +22,9 @@ from nichechain.execution.base import WORKER_DIED
 from nichechain.search.elites import Elites
 from nichechain.search.making import make_niches
 from nichechain.verification import record
-from nichechain.verification.evaluations import check_evaluations, evaluated
-from nichechain.verification.replay import Regrowth
+from nichechain.verification.record import Births, Ints, Run, largest_difference, runs_of
+from nichechain.verification.replay import Regrowth, check_evaluations, evaluated
 from nichechain.verification.result import EVALUATION, SEARCH, Check, Difference, Verification
-from nichechain.verification.runs import Births, Ints, Run, largest_difference, runs_of
 from nichechain.verification.search import check_pending_again, check_search, check_winners, search_again
 
 

@@ -10,13 +10,12 @@ from torch import nn
 
 from nichechain import BuildConfig, NichechainError, domains, variation
 from nichechain.domains import PlanarArm
+from nichechain.domains.base import Wrapper
 from nichechain.domains.policies.controllers import MLP, ModuleController
-from nichechain.domains.wrapper import Wrapper
 from nichechain.search.making import make_mutation
 from nichechain.variation import AdditiveMutation, Bound, SelfAdaptiveDomain, SelfAdaptiveMutation
-from nichechain.variation.layers import layers_of
+from nichechain.variation.additive import layers_of, parse_layer_scales, parse_step_bound
 from nichechain.variation.noise import CauchyNoise, StudentTNoise
-from nichechain.variation.parsing import parse_layer_scales, parse_step_bound
 
 CONFIG = BuildConfig("arm", (4, 4), PlanarArm.bounds, scale=0.5)
 FETCH = domains.make("fetch")
