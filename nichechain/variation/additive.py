@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from nichechain.core.checks import StepBound, check_choice, check_positive
 from nichechain.core.errors import NichechainError
 from nichechain.domains.base import Domain, Wrapper
-from nichechain.variation.noise import IndependentNoise, Noise, truncated
+from nichechain.variation.noise import IndependentNoise, MutationNoise, truncated
 
 Floats = NDArray[np.float64]
 # Of floats of any precision: that of float32 in a search, of others in a test.
@@ -67,7 +67,7 @@ class AdditiveMutation:
 
     Parameters
     ----------
-    noise : Noise
+    noise : MutationNoise
         ``noise(rng, n)`` gives n float64 values at scale 1.
     scale : float
         Factor on the noise, positive.
@@ -91,7 +91,7 @@ class AdditiveMutation:
     never leave the set.
     """
 
-    noise: Noise
+    noise: MutationNoise
     scale: float = 1.0
     bound: Bound | None = None
     layers: tuple[int, ...] = ()
@@ -123,7 +123,7 @@ class AdditiveMutation:
         return self.scale * np.repeat(self.layer_scales, self.layers)
 
 
-def check_bound(noise: Noise, bound: Bound | None) -> None:
+def check_bound(noise: MutationNoise, bound: Bound | None) -> None:
     """Check that noise can be bounded so.
 
     Raises
@@ -139,7 +139,11 @@ def check_bound(noise: Noise, bound: Bound | None) -> None:
 
 
 def add_noise(
-    parent: Genotype, rng: np.random.Generator, noise: Noise, scale: float | Floats, bound: Bound | None
+    parent: Genotype,
+    rng: np.random.Generator,
+    noise: MutationNoise,
+    scale: float | Floats,
+    bound: Bound | None,
 ) -> Genotype:
     """One child of a parent.
 
@@ -147,7 +151,7 @@ def add_noise(
     ----------
     parent : (P,) float array
     rng : numpy.random.Generator
-    noise : Noise
+    noise : MutationNoise
     scale : float or (P,) array
         Factor on the noise.
     bound : Bound, optional

@@ -13,7 +13,7 @@ from nichechain.core.checks import check_positive
 Floats = NDArray[np.float64]
 
 
-class Noise(Protocol):
+class MutationNoise(Protocol):
     """A distribution of steps."""
 
     def __call__(self, rng: np.random.Generator, n: int) -> Floats:
@@ -22,7 +22,7 @@ class Noise(Protocol):
 
 
 @runtime_checkable
-class IndependentNoise(Noise, Protocol):
+class IndependentNoise(MutationNoise, Protocol):
     """Coordinates that are independent and alike, symmetric about 0 and continuous."""
 
     def tail(self, x: Floats) -> Floats:

@@ -16,7 +16,7 @@ from nichechain.core.checks import check_positive, check_whole
 from nichechain.core.errors import NichechainError
 from nichechain.domains.base import Domain, Evaluation, Wrapper, check_genotypes
 from nichechain.variation.additive import Bound, Genotype, add_noise, check_bound
-from nichechain.variation.noise import Noise
+from nichechain.variation.noise import MutationNoise
 
 if TYPE_CHECKING:
     from torch import nn
@@ -28,7 +28,7 @@ class SelfAdaptiveMutation:
 
     Parameters
     ----------
-    noise : Noise
+    noise : MutationNoise
         What is added to the weights at step size 1.
     layers : tuple of int
         Weights that share a step size, in the order of the genotype; one entry for one step size.
@@ -42,7 +42,7 @@ class SelfAdaptiveMutation:
     Without selection ln σ has no drift, so σ keeps its median.
     """
 
-    noise: Noise
+    noise: MutationNoise
     layers: tuple[int, ...]
     bound: Bound | None = None
 

@@ -27,7 +27,7 @@ _FATAL_WARNINGS = ("CONTACTFULL", "CNSTRFULL", "BADQPOS", "BADQVEL", "BADQACC")
 
 
 @dataclass(frozen=True)
-class Episode:
+class Rollout:
     """What a policy saw and did.
 
     Parameters
@@ -78,7 +78,7 @@ class FetchEpisodes(Protocol):
         genotype: NDArray[np.float32],
         steps: int,
         disturbance: Disturbance = UNDISTURBED,
-    ) -> Episode:
+    ) -> Rollout:
         """One episode; safe to call from several threads."""
         ...
 
@@ -130,7 +130,7 @@ class SteppedFetch:
         genotype: NDArray[np.float32],
         steps: int,
         disturbance: Disturbance = UNDISTURBED,
-    ) -> Episode:
+    ) -> Rollout:
         """One episode; every thread has an environment of its own."""
         policy = controller.policy(genotype)
         # list.pop and list.append are atomic, so the list is a pool without a lock.
@@ -151,7 +151,7 @@ class SteppedFetch:
             observations.append(observation["observation"])
         failure = physics_failure(env.unwrapped.data)
         self._idle.append(env)
-        return Episode(np.array(observations), actions, failure)
+        return Rollout(np.array(observations), actions, failure)
 
 
 class NativeFetch:
@@ -195,7 +195,7 @@ class NativeFetch:
         genotype: NDArray[np.float32],
         steps: int,
         disturbance: Disturbance = UNDISTURBED,
-    ) -> Episode:
+    ) -> Rollout:
         """One episode; every thread has an mjData of its own."""
         assert isinstance(controller, MLP)
         import mujoco
@@ -239,7 +239,7 @@ class NativeFetch:
         )
         failure = physics_failure(data)
         self._idle.append(data)
-        return Episode(observations, actions, failure)
+        return Rollout(observations, actions, failure)
 
     def _displaced(self, shift: NDArray[np.float64]) -> mujoco.MjData:
         """The reset state with the block moved, as the environment's reset would place it."""
