@@ -200,7 +200,7 @@ EXEMPT: dict[tuple[str, str], str] = {
         ("pyribs.conversion.from_ribs", "objective_name", _TEXT),
         ("births.table.check_columns", "births names", _WITHIN),
         ("births.table.schema", "axes", _WITHIN),
-        ("births.table.table", "offspring child_niche accepted step run", _WITHIN),
+        ("births.table.make_table", "offspring child_niche accepted step run", _WITHIN),
         ("validation.held_out.probability_of", "parent child", _WITHIN),
         ("evolvability.coverage.visit_probabilities", "steps counted columns", _WITHIN),
         ("evolvability.coverage.at_least_once", "probability trials", _WITHIN),
