@@ -1,0 +1,56 @@
+"""How much memory a domain may spend on not computing twice what it has computed."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+from nichechain.arguments import check_whole
+from nichechain.errors import NichechainError
+
+CACHE_MEMORY = 2 * 2**30
+"""Bytes of the cache of a process, unless told otherwise: suits 24 GiB and what else runs there."""
+
+_UNITS = {"": 1, "B": 1, "KB": 10**3, "MB": 10**6, "GB": 10**9, "KIB": 2**10, "MIB": 2**20, "GIB": 2**30}
+
+
+def check_cache_memory(cache_memory: object) -> None:
+    """Refuse what is no number of bytes.
+
+    Raises
+    ------
+    NichechainError
+        If it is no whole number, or a negative one.
+    """
+    check_whole(cache_memory=cache_memory)
+    if cache_memory < 0:  # type: ignore[operator]
+        raise NichechainError(f"cache_memory is {cache_memory}, but must not be negative; 0 turns the cache off")
+
+
+def parse_memory(text: str) -> int:
+    """Bytes that a text such as ``2GiB``, ``500MB`` or ``0`` stands for.
+
+    Raises
+    ------
+    NichechainError
+        If it is not a number with a unit of memory.
+    """
+    found = re.fullmatch(r"([0-9]+(?:\.[0-9]+)?)\s*([A-Za-z]*)", text.strip(), re.ASCII)
+    if found is None or found[2].upper() not in _UNITS:
+        raise NichechainError(f"memory is {text!r}, but must be such as 2GiB or 500MB, or 0 for no cache")
+    return int(float(found[1]) * _UNITS[found[2].upper()])
+
+
+def limit_cache(domain: Any, cache_memory: int) -> None:
+    """Set the memory of a domain's cache, or of the domain's that it wraps; others have none.
+
+    Raises
+    ------
+    NichechainError
+        If it is negative or no whole number.
+    """
+    check_cache_memory(cache_memory)
+    while hasattr(domain, "domain"):
+        domain = domain.domain
+    if hasattr(domain, "cache_memory"):
+        domain.cache_memory = cache_memory
