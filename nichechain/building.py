@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
 
-from nichechain import domains, store, variation
+from nichechain import domains, savings, store, variation
 from nichechain.config import MOST_FAILED, BuildConfig
 from nichechain.domains.base import Domain
 from nichechain.errors import ArchiveError
@@ -107,6 +108,7 @@ def build(
         else:
             niches = make_niches(config)
         search = MapElites(domain, niches, mutate, config, state, scores)
+        search.savings = savings.read(folder) if state is not None else search.savings
         writer = store.Writer(folder, config, store.DomainFacts.of(domain), niches=niches)
 
         under_way = 0
@@ -116,6 +118,12 @@ def build(
             under_way += done
             if on_progress is not None:
                 on_progress(Progress(search.births + under_way, search.filled, outside, failures.failed))
+
+        def commit() -> None:
+            writer.commit(search.state)
+            # Of no consequence where it cannot be written.
+            with suppress(OSError):
+                savings.write(folder, search.savings)
 
         last_commit = time.monotonic()
         pause = CHECKPOINT_SECONDS
@@ -136,7 +144,7 @@ def build(
                 tell()
                 if time.monotonic() - last_commit > pause:
                     began = time.monotonic()
-                    writer.commit(search.state)
+                    commit()
                     last_commit = time.monotonic()
                     # Many large genotypes take a while to write.
                     pause = max(CHECKPOINT_SECONDS, (last_commit - began) / _COMMIT_SHARE)
@@ -144,7 +152,7 @@ def build(
             # An interrupt between two halves of a step leaves nothing to commit; the last commit
             # is at most half a minute old.
             if search.settled and search.births == writer.births > 0:
-                writer.commit(search.state)
+                commit()
 
 
 def _count(rows: pa.Table, state: int) -> int:

@@ -23,6 +23,7 @@ from nichechain.errors import NichechainError
 from nichechain.execution import Executor
 from nichechain.niches import CVTNiches, GridNiches, Niches
 from nichechain.randomness import Purpose, keyed
+from nichechain.savings import Savings
 from nichechain.selection import CuriosityScores, draw_curious
 from nichechain.variation import Mutation
 
@@ -105,6 +106,8 @@ class MapElites:
         Births so far.
     step : int
         The last step begun, -1 before the first.
+    savings : Savings
+        How much physics the births so far were spared, as far as they were evaluated here.
     settled : bool
         Whether the state is that after a finished batch, not in the middle of keeping one.
 
@@ -134,6 +137,7 @@ class MapElites:
         self._pending = _no_offspring(domain.genotype_length)
         self.births = 0
         self.step = -1
+        self.savings = Savings()
         self.settled = True
         if state is not None:
             self._archive.add(state.elites)
@@ -188,6 +192,7 @@ class MapElites:
         self._pending = waiting[limit:]
         self.step = step
         self.births += len(offspring)
+        self.savings = self.savings.and_of(evaluation)
         rows = self._keep(offspring, evaluation)
         self.settled = True
         return rows

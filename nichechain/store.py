@@ -33,7 +33,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
-from nichechain import __version__, births, untrusted
+from nichechain import __version__, births, savings, untrusted
 from nichechain.births import Offspring
 from nichechain.committed import BIRTHS, CENTROIDS, FORMAT, META, checksum, part_name, read_part
 from nichechain.committed import DomainFacts as DomainFacts
@@ -211,6 +211,7 @@ def clear(folder: Path) -> None:
     """Remove an archive's files from a folder, and nothing else."""
     (folder / META).unlink(missing_ok=True)
     (folder / f"{META}.tmp").unlink(missing_ok=True)
+    (folder / savings.FILE).unlink(missing_ok=True)
     for pattern in ("elites-*.npz*", f"{CENTROIDS}*", f"{BIRTHS}/part-*.parquet*"):
         for path in folder.glob(pattern):
             path.unlink()

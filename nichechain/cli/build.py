@@ -89,6 +89,9 @@ class Build:
     """Further options of the domain, such as joints=20 of the arm."""
     workers: Annotated[str | None, console.option("WORKERS", "one thread per processor")] = None
     """Who evaluates: a number of threads, processes:N, ray or ray://HOST:PORT. The result is the same."""
+    cache_memory: Annotated[str | None, console.option("SIZE", "2GiB")] = None
+    """Memory on each machine for physics that was computed before, such as 500MB, or 0 for none. The result
+    is the same."""
     max_failed: float = MOST_FAILED
     """Share of births that may fail, from 0 to 1, before the build is stopped."""
     out: Annotated[Path | None, console.option("PATH", "archives/DOMAIN-seedSEED")] = None
@@ -245,7 +248,7 @@ def run(arguments: Sequence[str]) -> int:
         command = console.parse(Build, arguments, default=Build.of(stored.config))
     config = command.config()
     shown = console.console()
-    with execution.make(command.workers) as executor:
+    with execution.make(command.workers, command.cache_memory) as executor:
         if command.force and folder.exists():
             with store.writing(folder):
                 store.clear(folder)
@@ -281,6 +284,7 @@ def _report(folder: Path, shown: object) -> None:
     """A short account of a finished build, and what to do next."""
     from rich.console import Console
 
+    from nichechain import savings
     from nichechain.archive import load
     from nichechain.evolvability import DRAWS, niche_evolvability
 
@@ -299,6 +303,7 @@ def _report(folder: Path, shown: object) -> None:
         "births": f"{births}, {counts.births_outside} of them outside the grid"
         + (f", {failed} failed" if failed else ""),
         "rows of T observed": f"{counts.rows_observed} of {n}",
+        **console.physics(savings.read(folder)),
         "archive": str(folder),
     }
     shown.print()

@@ -6,6 +6,7 @@ import re
 from typing import Any
 
 from nichechain.arguments import check_whole
+from nichechain.domains.wrapper import Wrapper
 from nichechain.errors import NichechainError
 
 CACHE_MEMORY = 2 * 2**30
@@ -24,7 +25,7 @@ def check_cache_memory(cache_memory: object) -> None:
     """
     check_whole(cache_memory=cache_memory)
     if cache_memory < 0:  # type: ignore[operator]
-        raise NichechainError(f"cache_memory is {cache_memory}, but must not be negative; 0 turns the cache off")
+        raise NichechainError(f"cache_memory is {cache_memory}, but must not be negative (0: no cache)")
 
 
 def parse_memory(text: str) -> int:
@@ -33,24 +34,29 @@ def parse_memory(text: str) -> int:
     Raises
     ------
     NichechainError
-        If it is not a number with a unit of memory.
+        If it is no number with a unit of memory, or negative.
     """
     found = re.fullmatch(r"([0-9]+(?:\.[0-9]+)?)\s*([A-Za-z]*)", text.strip(), re.ASCII)
     if found is None or found[2].upper() not in _UNITS:
-        raise NichechainError(f"memory is {text!r}, but must be such as 2GiB or 500MB, or 0 for no cache")
+        raise NichechainError(
+            f"cache_memory is {text!r}, but must be such as 2GiB or 500MB, or 0 for no cache"
+        )
     return int(float(found[1]) * _UNITS[found[2].upper()])
 
 
-def limit_cache(domain: Any, cache_memory: int) -> None:
-    """Set the memory of a domain's cache, or of the domain's that it wraps; others have none.
+def cache_memory_of(domain: Any) -> int:
+    """Bytes for the cache of a domain, or of the domain that it wraps; 0 where there is none."""
+    return int(getattr(_innermost(domain), "cache_memory", 0))
 
-    Raises
-    ------
-    NichechainError
-        If it is negative or no whole number.
-    """
-    check_cache_memory(cache_memory)
-    while hasattr(domain, "domain"):
+
+def limit_cache(domain: Any, cache_memory: int) -> None:
+    """Set the memory of the cache of a domain, or of the domain that it wraps, where there is one."""
+    inner = _innermost(domain)
+    if getattr(inner, "cache_memory", cache_memory) != cache_memory:
+        inner.cache_memory = cache_memory
+
+
+def _innermost(domain: Any) -> Any:
+    while isinstance(domain, Wrapper):
         domain = domain.domain
-    if hasattr(domain, "cache_memory"):
-        domain.cache_memory = cache_memory
+    return domain

@@ -35,6 +35,8 @@ _log = logging.getLogger(__name__)
 _PARENT, _CODE, _CHILD, _SIBLING, _USED, _CONTENT = range(6)
 _WORD = 8
 _SLAB_ROWS = 4096
+# More than any machine has, so that the list of slabs stays short.
+_MOST = 2**40
 
 
 @numba.njit(nogil=True, cache=True)
@@ -254,7 +256,7 @@ class Motions:
         self._width = _CONTENT + observation.size + state
         self.state = state
         self._blocked = blocked
-        self._capacity = max(1, limit // (self._width * _WORD))
+        self._capacity = max(1, min(limit, _MOST) // (self._width * _WORD))
         self._rows = min(_SLAB_ROWS, self._capacity)
         self._slabs: list[NDArray[np.float64]] = []
         # Slabs are added while others walk, so the list of addresses never moves.
