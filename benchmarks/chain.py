@@ -23,11 +23,11 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 import nichechain as nc
-from nichechain import store
-from nichechain.births import NONE
-from nichechain.coverage import expected_coverage, sampled_coverage
+from nichechain.archive import read
+from nichechain.births.table import NONE
+from nichechain.evolvability.coverage import expected_coverage, sampled_coverage
+from nichechain.evolvability.reach import visit_probability
 from nichechain.niches import GridNiches
-from nichechain.reach import visit_probability
 
 NONZEROS = 17
 
@@ -98,7 +98,7 @@ def exact(largest: int, generations: int = 10) -> None:
 def estimator(births: int = 30_000, generations: int = 5) -> None:
     """Fit and one draw, on the shipped archive."""
     archive = nc.load("fetch-pick-and-place")
-    table = store.read_births(archive.folder, archive.meta)[:births]
+    table = read.read_births(archive.folder, archive.meta)[:births]
     parent, child, elite = (
         table[name].fill_null(NONE).to_numpy() for name in ("parent_niche", "child_niche", "parent_uid")
     )

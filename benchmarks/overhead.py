@@ -24,13 +24,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 import nichechain as nc
-from nichechain import domains, execution, store, variation
-from nichechain.building import build
-from nichechain.config import BuildConfig
+from nichechain import domains, execution, variation
+from nichechain.archive import read, write
+from nichechain.archive.build import build
+from nichechain.core.randomness import Purpose, keyed
 from nichechain.domains import Evaluation, FetchPickAndPlace, PlanarArm
 from nichechain.domains.base import Domain
 from nichechain.execution import Executor, Threads, available_cpus
-from nichechain.randomness import Purpose, keyed
+from nichechain.search.config import BuildConfig
 
 
 class TimedFetch(FetchPickAndPlace):
@@ -191,9 +192,9 @@ def disk() -> None:
     print(f"shipped archive of {meta.births} births:")
     print(f"  births on disk:          {births / meta.births:.1f} bytes each")
     print(f"  elites on disk:          {elites / 1e6:.2f} MB for {len(archive.elites)}")
-    state, rows = store.read_state(folder, meta), store.read_births(folder, meta)
+    state, rows = read.read_state(folder, meta), read.read_births(folder, meta)
     with tempfile.TemporaryDirectory() as other:
-        writer = store.Writer(Path(other), meta.config, meta.facts)
+        writer = write.Writer(Path(other), meta.config, meta.facts)
         writer.append(rows)
         print(f"  a commit:                {1e3 * _best(lambda: writer.commit(state)):.0f} ms")
     counting, counts = _best(lambda: nc.load(folder).counts), archive.counts

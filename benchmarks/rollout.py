@@ -33,8 +33,8 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from nichechain.controllers import MLP
 from nichechain.domains.fetch import FetchPickAndPlace
+from nichechain.domains.policies.controllers import MLP
 from nichechain.execution import Threads, available_cpus
 
 Genotypes = NDArray[np.float32]

@@ -20,12 +20,12 @@ from pathlib import Path
 
 import numpy as np
 
-from nichechain import store
-from nichechain.building import Progress, build
-from nichechain.config import BuildConfig
+from nichechain.archive import read, write
+from nichechain.archive.build import Progress, build
 from nichechain.domains import PlanarArm
 from nichechain.execution import Threads
 from nichechain.niches import parse_shape
+from nichechain.search.config import BuildConfig
 
 
 class Meter:
@@ -36,15 +36,15 @@ class Meter:
         self.marks = [(0, time.process_time(), time.perf_counter(), *memory())]
         self.committing = 0.0
         self.commits = 0
-        commit = store.Writer.commit
+        commit = write.Writer.commit
 
-        def timed(writer: store.Writer, state: object) -> None:
+        def timed(writer: write.Writer, state: object) -> None:
             began = time.perf_counter()
             commit(writer, state)  # type: ignore[arg-type]
             self.committing += time.perf_counter() - began
             self.commits += 1
 
-        store.Writer.commit = timed  # type: ignore[method-assign]
+        write.Writer.commit = timed  # type: ignore[method-assign]
 
     def __call__(self, progress: Progress) -> None:
         """Take the time whenever a tenth is done."""
@@ -96,11 +96,11 @@ def report(meter: Meter, folder: Path) -> None:
     print("tenth   µs of processor per birth   memory (MB)   its own (MB)")
     for tenth, row in enumerate(zip(each, held[1:], own[1:], strict=True), 1):
         print("{:5d}   {:25.1f}   {:11.0f}   {:12.0f}".format(tenth, *row))
-    meta = store.read_meta(folder)
-    filled = len(store.read_state(folder, meta).elites)
+    meta = read.read_meta(folder)
+    filled = len(read.read_state(folder, meta).elites)
     largest = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3
     began = time.perf_counter()
-    rows = store.read_births(folder, meta)
+    rows = read.read_births(folder, meta)
     reading = time.perf_counter() - began
     size = sum(path.stat().st_size for path in folder.rglob("*") if path.is_file())
     beside = size - sum(path.stat().st_size for path in folder.glob("elites-*"))

@@ -19,12 +19,12 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from nichechain import diversity, domains, variation
-from nichechain.diversity import metrics
+from nichechain import domains, variation
 from nichechain.domains.base import Domain, Evaluation
 from nichechain.execution import Threads, available_cpus
 from nichechain.niches import GridNiches
-from nichechain.walks import Selective, TopFraction, Uniform, WalkConfig, Walks, walk
+from nichechain.walks import Selective, TopFraction, Uniform, WalkConfig, Walks, diversity, walk
+from nichechain.walks.diversity import metrics
 
 
 class Stopwatch:

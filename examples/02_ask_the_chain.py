@@ -10,9 +10,9 @@ from matplotlib.figure import Figure
 
 import nichechain as nc
 from nichechain import plots
-from nichechain.chain.passage import mean_first_passage_times
-from nichechain.chain.wormholes import wormholes
-from nichechain.reach import reach
+from nichechain.chain.structure.passage import mean_first_passage_times
+from nichechain.chain.structure.wormholes import wormholes
+from nichechain.evolvability.reach import reach
 
 archive = nc.load("fetch-pick-and-place")
 chain = archive.chain()

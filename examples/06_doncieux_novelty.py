@@ -13,9 +13,9 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from nichechain import walks
-from nichechain.diversity import ArchiveRule, KNearest
 from nichechain.domains import CosinusMap
-from nichechain.polynomial import PolynomialMutation
+from nichechain.variation.polynomial import PolynomialMutation
+from nichechain.walks.diversity import ArchiveRule, KNearest
 
 RUNS, GENERATIONS, EVERY, OFFSPRING, BINS = 20, 300, 20, 300, 50
 

@@ -9,13 +9,14 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any
 
+from nichechain._version import __version__ as __version__
+
 if TYPE_CHECKING:
-    from nichechain import diversity, domains, experiments, landscape, variation, walks
-    from nichechain.archive import Archive, Elite, load
-    from nichechain.building import build
+    from nichechain import domains, landscape, studies, variation, walks
+    from nichechain.archive.archive import Archive, Elite, load
+    from nichechain.archive.build import build
     from nichechain.chain import NicheChain, TransitionCounts, estimate
-    from nichechain.config import BuildConfig
-    from nichechain.errors import ArchiveError, NichechainError
+    from nichechain.core.errors import ArchiveError, NichechainError
     from nichechain.evolvability import (
         Evolvability,
         NicheBand,
@@ -29,37 +30,36 @@ if TYPE_CHECKING:
     from nichechain.execution import Threads
     from nichechain.niches import CVTNiches, GridNiches, Niches, one_hot
     from nichechain.pyribs import from_ribs
-    from nichechain.selection import curiosity
+    from nichechain.search.config import BuildConfig
+    from nichechain.search.parents import curiosity
     from nichechain.verification import Verification, verify
     from nichechain.walks import walk
 
-__version__ = "0.1.0"
-
 # Names are imported when they are first used: NumPy, SciPy and pandas take half a second.
 _HOMES = {
-    "Archive": "archive",
-    "ArchiveError": "errors",
-    "BuildConfig": "config",
+    "Archive": "archive.archive",
+    "ArchiveError": "core.errors",
+    "BuildConfig": "search.config",
     "CVTNiches": "niches",
-    "Elite": "archive",
+    "Elite": "archive.archive",
     "Evolvability": "evolvability",
     "GridNiches": "niches",
     "NicheBand": "evolvability",
     "NicheChain": "chain",
     "NicheEvolvability": "evolvability",
-    "NichechainError": "errors",
+    "NichechainError": "core.errors",
     "Niches": "niches",
     "Threads": "execution",
     "TransitionCounts": "chain",
     "Verification": "verification",
     "bootstrap_elites": "evolvability",
-    "build": "building",
-    "curiosity": "selection",
+    "build": "archive.build",
+    "curiosity": "search.parents",
     "estimate": "chain",
     "from_ribs": "pyribs",
     "genotype_evolvability": "evolvability",
     "l_evolvability": "evolvability",
-    "load": "archive",
+    "load": "archive.archive",
     "niche_evolvability": "evolvability",
     "one_hot": "niches",
     "prior_sensitivity": "evolvability",
@@ -67,7 +67,7 @@ _HOMES = {
     "walk": "walks",
 }
 
-_PACKAGES = ("diversity", "domains", "experiments", "landscape", "variation", "walks")
+_PACKAGES = ("domains", "landscape", "studies", "variation", "walks")
 
 __all__ = [
     "Archive",
@@ -88,10 +88,8 @@ __all__ = [
     "bootstrap_elites",
     "build",
     "curiosity",
-    "diversity",
     "domains",
     "estimate",
-    "experiments",
     "from_ribs",
     "genotype_evolvability",
     "l_evolvability",
@@ -100,6 +98,7 @@ __all__ = [
     "niche_evolvability",
     "one_hot",
     "prior_sensitivity",
+    "studies",
     "variation",
     "verify",
     "walk",

@@ -18,16 +18,16 @@ import pytest
 from numpy.typing import NDArray
 
 import nichechain as nc
-from nichechain import diversity, variation
-from nichechain.building import build
-from nichechain.config import BuildConfig
+from nichechain import variation
+from nichechain.archive.build import build
+from nichechain.core.randomness import Purpose
 from nichechain.domains import Evaluation, FetchPickAndPlace, PlanarArm
 from nichechain.domains.base import Domain
 from nichechain.execution import Executor, Processes, Ray, Threads
 from nichechain.niches import GridNiches
-from nichechain.randomness import Purpose
+from nichechain.search.config import BuildConfig
 from nichechain.verification import verify
-from nichechain.walks import TopFraction, WalkConfig, Walks, walk
+from nichechain.walks import TopFraction, WalkConfig, Walks, diversity, walk
 
 from .execution.samples import Arm
 
@@ -151,11 +151,12 @@ import numpy as np
 import torch
 random.seed(1); np.random.seed(2); torch.manual_seed(3)
 from dataclasses import replace
-from nichechain.building import build
-from nichechain.config import BuildConfig
+from nichechain.archive.build import build
+from nichechain.search.config import BuildConfig
 from nichechain.domains import PlanarArm
 from nichechain.execution import Threads
-from nichechain import diversity, variation
+from nichechain import variation
+from nichechain.walks import diversity
 from nichechain.niches import GridNiches
 from nichechain.walks import TopFraction, WalkConfig, Walks, WalkState
 
@@ -257,7 +258,7 @@ def test_analysis_draws_nothing_that_a_search_draws(tmp_path: Path, monkeypatch:
         keys.add(spawn_key)
         return real(entropy, spawn_key=spawn_key)
 
-    monkeypatch.setattr("nichechain.randomness.np.random.SeedSequence", spy)
+    monkeypatch.setattr("nichechain.core.randomness.np.random.SeedSequence", spy)
     _analyse(tmp_path)
     used = {Purpose(key[0]) for key in keys}
     assert {Purpose.POSTERIOR, Purpose.WALKS, Purpose.OFFSPRING, Purpose.RESAMPLING} <= used
@@ -272,7 +273,7 @@ def test_a_search_draws_with_its_own_keys_only(monkeypatch: pytest.MonkeyPatch, 
         keys.append((entropy, spawn_key))
         return real(entropy, spawn_key=spawn_key)
 
-    monkeypatch.setattr("nichechain.randomness.np.random.SeedSequence", spy)
+    monkeypatch.setattr("nichechain.core.randomness.np.random.SeedSequence", spy)
     with Threads(1) as executor:
         build(CONFIG, tmp_path, executor, domain=Arm())
     assert {entropy for entropy, _ in keys} == {CONFIG.seed}

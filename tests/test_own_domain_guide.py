@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import nichechain as nc
 from nichechain.cli.build import Build
 from nichechain.cli.console import parse
+from nichechain.search.making import make_domain
 
 GUIDE = Path(__file__).parents[1] / "docs" / "own_domain.md"
 TEXT = GUIDE.read_text(encoding="utf-8")
@@ -74,4 +74,4 @@ def test_the_commands_ask_for_builds():
         assert words[:2] == ["nichechain", "build"]
         config = parse(Build, words[2:]).config()
         assert config.domain_options
-        assert repr(nc.domains.of(config))
+        assert repr(make_domain(config))

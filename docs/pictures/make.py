@@ -21,9 +21,10 @@ from numpy.typing import NDArray
 from PIL import Image
 
 import nichechain as nc
-from nichechain import diversity, plots
-from nichechain.chain.wormholes import wormholes
+from nichechain import plots
+from nichechain.chain.structure.wormholes import wormholes
 from nichechain.plots.style import EDGE, EMPTY, INK, LONG_JUMP, START, behavior_axes
+from nichechain.walks import diversity
 
 HERE = Path(__file__).resolve().parent
 EXAMPLES = HERE.parents[1] / "examples"

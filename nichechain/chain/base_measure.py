@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from nichechain.alias import RowSampler
 from nichechain.chain.counts import TransitionCounts
 from nichechain.chain.displacement import Displacement, GridDisplacement
 from nichechain.chain.distance import DistanceDisplacement
+from nichechain.core.row_sampler import RowSampler
 from nichechain.niches import GridNiches, Niches
 
 Floats = NDArray[np.float64]

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
-from nichechain.arguments import as_floats, as_whole
-from nichechain.births import NONE
-from nichechain.errors import NichechainError
+from nichechain.births.table import NONE
+from nichechain.core.checks import as_floats, as_whole
+from nichechain.core.errors import NichechainError
 from nichechain.niches import Niches
 
 Ints = NDArray[np.int64]

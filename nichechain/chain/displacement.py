@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy import fft, sparse
 from scipy.signal import fftconvolve
 
-from nichechain.alias import RowSampler
+from nichechain.core.row_sampler import RowSampler
 from nichechain.niches import GridNiches
 
 if TYPE_CHECKING:

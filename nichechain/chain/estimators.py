@@ -8,14 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from nichechain.arguments import check_numbers
 from nichechain.chain.base_measure import BaseMeasure
 from nichechain.chain.counts import TransitionCounts
 from nichechain.chain.empirical_bayes import design_effect, most_likely
 from nichechain.chain.model import NicheChain, Transition
 from nichechain.chain.operator import PooledTransition
 from nichechain.chain.posterior import DirichletPosterior
-from nichechain.errors import NichechainError
+from nichechain.core.checks import check_numbers
+from nichechain.core.errors import NichechainError
 
 Floats = NDArray[np.float64]
 

@@ -6,9 +6,9 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from nichechain.births import NONE, check_columns
+from nichechain.births.table import NONE, check_columns
 from nichechain.chain.counts import TransitionCounts
-from nichechain.errors import NichechainError
+from nichechain.core.errors import NichechainError
 from nichechain.niches import Niches
 
 
@@ -25,7 +25,7 @@ def counts_of(
     Parameters
     ----------
     births : pyarrow.Table
-        Columns of :mod:`nichechain.births`; elites of different runs are kept apart.
+        Columns of :mod:`nichechain.births.table`; elites of different runs are kept apart.
     niches : Niches
         The niches that the states of the births belong to.
     run : int, optional

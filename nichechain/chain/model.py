@@ -10,9 +10,9 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
 from nichechain.chain.operator import PooledTransition
-from nichechain.errors import NichechainError
+from nichechain.core.errors import NichechainError
+from nichechain.core.notebook import facts_table
 from nichechain.niches import Niche, Niches
-from nichechain.notebook import facts_table
 
 if TYPE_CHECKING:
     import networkx as nx
@@ -149,8 +149,8 @@ class NicheChain:
         return niche_evolvability(self, l=l, lineages=lineages, **options).value
 
     def graph(self, threshold: float = 0.05) -> nx.DiGraph:
-        """The chain as a graph, see :func:`nichechain.chain.graph.reachability_graph`."""
-        from nichechain.chain.graph import reachability_graph
+        """The chain as a graph, see :func:`nichechain.chain.structure.graph.reachability_graph`."""
+        from nichechain.chain.structure.graph import reachability_graph
 
         return reachability_graph(self, threshold)
 

@@ -54,7 +54,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 0
     if words[0] not in COMMANDS:
         return _fail(f"there is no command {words[0]!r}: it must be one of {', '.join(COMMANDS)}")
-    from nichechain.errors import NichechainError
+    from nichechain.core.errors import NichechainError
 
     # A module cannot bear the name of a keyword.
     name = f"{words[0]}_" if keyword.iskeyword(words[0]) else words[0]

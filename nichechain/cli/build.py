@@ -12,16 +12,16 @@ from typing import Annotated
 import tyro
 
 from nichechain.cli import console
-from nichechain.config import (
+from nichechain.core.checks import DomainOption
+from nichechain.core.errors import ArchiveError, NichechainError
+from nichechain.search.config import (
     MOST_FAILED,
     BuildConfig,
-    DomainOption,
     MutationName,
     Outside,
     Replacement,
     Selection,
 )
-from nichechain.errors import ArchiveError, NichechainError
 
 _GRID = "20x20"
 _MANY_NICHES = 1000
@@ -119,9 +119,10 @@ class Build:
 
     def config(self) -> BuildConfig:
         """What is asked for, checked."""
-        from nichechain import domains, variation
-        from nichechain.niches import check, parse_bounds, parse_niches, parse_shape
-        from nichechain.variation.configured import parse_layer_scales, parse_step_bound
+        from nichechain import domains
+        from nichechain.niches import parse_bounds, parse_niches, parse_shape
+        from nichechain.search.making import check_niches, make_mutation
+        from nichechain.variation.parsing import parse_layer_scales, parse_step_bound
 
         if self.grid is not None and self.niches is not None:
             raise NichechainError(
@@ -132,12 +133,12 @@ class Build:
         bounds = domain.bounds
         # Bounds that the domain was just told may be of fewer axes than it has in the end.
         if self.bounds is not None and options.get("bounds") != self.bounds:
-            bounds = parse_bounds(self.bounds)
+            bounds = parse_bounds(self.bounds, "--bounds")
         config = BuildConfig(
             domain=self.domain,
-            shape=parse_shape(_GRID if self.grid is None else self.grid)
+            shape=parse_shape(_GRID if self.grid is None else self.grid, "--grid")
             if self.niches is None
-            else (parse_niches(self.niches),),
+            else (parse_niches(self.niches, "--niches"),),
             niches="grid" if self.niches is None else "cvt",
             niches_seed=self.niches_seed,
             bounds=bounds,
@@ -150,8 +151,10 @@ class Build:
             mutation=self.mutation,
             scale=self.scale,
             df=self.df,
-            step_bound=None if self.step_bound is None else parse_step_bound(self.step_bound),
-            layer_scales=() if self.layer_scales is None else parse_layer_scales(self.layer_scales),
+            step_bound=None if self.step_bound is None else parse_step_bound(self.step_bound, "--step-bound"),
+            layer_scales=()
+            if self.layer_scales is None
+            else parse_layer_scales(self.layer_scales, "--layer-scales"),
             self_adaptive=self.self_adaptive,
             selection=self.selection,
             replacement=self.replacement,
@@ -166,8 +169,8 @@ class Build:
             raise NichechainError(
                 f"--bounds is {self.bounds!r}, but {self.domain} needs {axes} pairs of numbers"
             )
-        check(config)
-        variation.configured(config, domain)
+        check_niches(config)
+        make_mutation(config, domain)
         return config
 
     @classmethod
@@ -222,9 +225,12 @@ def domain_option_text(value: DomainOption) -> str:
 def run(arguments: Sequence[str]) -> int:
     """Build, then say what came of it."""
     command = console.parse(Build, arguments)
-    from nichechain import execution, store
-    from nichechain.building import build
-    from nichechain.trust import check_trusted
+    from nichechain import execution
+    from nichechain.archive import read, write
+    from nichechain.archive.build import build
+    from nichechain.archive.trust import check_trusted
+    from nichechain.core.locking import writing
+    from nichechain.search.making import make_domain
 
     here = str(Path.cwd())
     if command.domain.startswith("gym:") and here not in sys.path:
@@ -235,8 +241,8 @@ def run(arguments: Sequence[str]) -> int:
     folder = command.folder
     if command.resume and command.force:
         raise NichechainError("--resume and --force exclude each other: go on, or start over")
-    if store.is_archive(folder) and not command.force:
-        stored = store.read_meta(folder)
+    if read.is_archive(folder) and not command.force:
+        stored = read.read_meta(folder)
         if not command.resume:
             raise ArchiveError(
                 f"{folder} already holds an archive of {stored.births} births: "
@@ -250,14 +256,12 @@ def run(arguments: Sequence[str]) -> int:
     shown = console.console()
     with execution.make(command.workers, command.cache_memory) as executor:
         if command.force and folder.exists():
-            with store.writing(folder):
-                store.clear(folder)
+            with writing(folder):
+                write.clear(folder)
         with console.spinner("loading the simulator; its engine is compiled once, in about 20 s"):
             import ribs.archives  # noqa: F401  # takes seconds, which the bar should not count
 
-            from nichechain import domains
-
-            domain = domains.of(config)
+            domain = make_domain(config)
             # What goes wrong with it is for the build to say.
             execution.evaluate_rows(domain, domain.sample(1, seed=0))
         try:
@@ -272,7 +276,7 @@ def run(arguments: Sequence[str]) -> int:
                 )
         except KeyboardInterrupt:
             console.leave_at_next_interrupt()
-            kept = store.read_meta(folder).births if store.is_archive(folder) else 0
+            kept = read.read_meta(folder).births if read.is_archive(folder) else 0
             again = f"nichechain build {config.domain} --out {folder} --resume"
             shown.print(f"Stopped; {kept} of {config.evaluations} births are kept. To go on:\n  {again}")
             return 130
@@ -284,9 +288,9 @@ def _report(folder: Path, shown: object) -> None:
     """A short account of a finished build, and what to do next."""
     from rich.console import Console
 
-    from nichechain import savings
-    from nichechain.archive import load
+    from nichechain.archive.archive import load
     from nichechain.evolvability import DRAWS, niche_evolvability
+    from nichechain.search import savings
 
     assert isinstance(shown, Console)
     archive = load(folder)

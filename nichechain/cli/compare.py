@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import tyro
 
 from nichechain.cli import console
-from nichechain.errors import NichechainError
+from nichechain.core.errors import NichechainError
 
 if TYPE_CHECKING:
-    from nichechain.chain.contrast import Contrast
+    from nichechain.validation.contrast import Contrast
 
 _NAMES = {
     "evolvability": "reached by {lineages} lineages",
@@ -49,10 +49,10 @@ class Compare:
 def run(arguments: Sequence[str]) -> int:
     """Compare."""
     command = console.parse(Compare, arguments)
-    from nichechain import store
-    from nichechain.archive import load
-    from nichechain.chain.contrast import contrast
-    from nichechain.coverage import check_lengths
+    from nichechain.archive import read
+    from nichechain.archive.archive import load
+    from nichechain.evolvability.coverage import check_lengths
+    from nichechain.validation.contrast import contrast
 
     check_lengths(command.l, command.lineages)
     if command.seed < 0:
@@ -63,7 +63,7 @@ def run(arguments: Sequence[str]) -> int:
             f"{command.first} and {command.second} have different niches: compare archives of the same grid, "
             "bounds and outside"
         )
-    births = [store.read_births(archive.folder, archive.meta) for archive in archives]
+    births = [read.read_births(archive.folder, archive.meta) for archive in archives]
     with console.spinner("resampling"):
         found = contrast(
             births[0],

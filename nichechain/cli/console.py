@@ -13,8 +13,8 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
-    from nichechain.building import Progress
-    from nichechain.savings import Savings
+    from nichechain.archive.build import Progress
+    from nichechain.search.savings import Savings
 
 Command = TypeVar("Command")
 

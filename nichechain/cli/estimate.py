@@ -11,14 +11,14 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import tyro
 
 from nichechain.cli import console
-from nichechain.errors import NichechainError
+from nichechain.core.errors import NichechainError
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from nichechain.archive import Archive
-    from nichechain.chain.comparison import Comparison
-    from nichechain.chain.stability import RankStability
+    from nichechain.archive.archive import Archive
+    from nichechain.validation.held_out import Comparison
+    from nichechain.validation.stability import RankStability
 
 FORMATS = (".png", ".svg", ".pdf")
 
@@ -55,7 +55,7 @@ def run(arguments: Sequence[str]) -> int:
     """Say what the births say of T."""
     command = console.parse(Estimate, arguments)
     _check(command)
-    from nichechain.archive import load
+    from nichechain.archive.archive import load
 
     archive = load(command.path)
     if command.compare:
@@ -146,7 +146,7 @@ def _estimate(command: Estimate, archive: Archive) -> None:
 
 
 def _compare(command: Estimate, archive: Archive) -> None:
-    from nichechain.chain.comparison import compare_estimators
+    from nichechain.validation.held_out import compare_estimators
 
     with console.spinner("holding out elites"):
         found = compare_estimators(
@@ -180,7 +180,7 @@ def _show_comparison(found: Comparison) -> None:
 
 
 def _stability(command: Estimate, archive: Archive) -> None:
-    from nichechain.chain.stability import rank_stability
+    from nichechain.validation.stability import rank_stability
 
     with console.spinner("thinning births"):
         found = rank_stability(

@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import tyro
 
 from nichechain.cli import console
-from nichechain.errors import NichechainError
+from nichechain.core.errors import NichechainError
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from nichechain.archive import Archive
+    from nichechain.archive.archive import Archive
     from nichechain.chain import NicheChain
 
 _LABELS = {"posterior": "90 % interval", "prior": "prior band", "bootstrap": "90 % bootstrap"}
@@ -78,8 +78,8 @@ def run(arguments: Sequence[str]) -> int:
     """Score niches or an elite."""
     command = console.parse(Evolvability, arguments)
     _check(command)
-    from nichechain.archive import load
-    from nichechain.coverage import check_lengths
+    from nichechain.archive.archive import load
+    from nichechain.evolvability.coverage import check_lengths
 
     check_lengths(command.l, command.lineages)
     archive = load(command.path)

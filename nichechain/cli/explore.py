@@ -10,7 +10,7 @@ from typing import Annotated, Literal
 import tyro
 
 from nichechain.cli import console
-from nichechain.errors import NichechainError
+from nichechain.core.errors import NichechainError
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ def run(arguments: Sequence[str]) -> int:
         raise NichechainError(f"--out is {str(command.out)!r}, but that is a folder")
     if command.seed < 0:
         raise NichechainError(f"--seed is {command.seed}, but must not be negative")
-    from nichechain.archive import load
+    from nichechain.archive.archive import load
     from nichechain.plots.explorer import write_explorer
 
     archive = load(command.path)

@@ -10,8 +10,8 @@ from typing import Annotated
 import tyro
 
 from nichechain.cli import console
-from nichechain.config import Outside
-from nichechain.errors import NichechainError
+from nichechain.core.errors import NichechainError
+from nichechain.search.config import Outside
 
 
 @dataclass(frozen=True)
@@ -56,8 +56,8 @@ def run(arguments: Sequence[str]) -> int:
     for name in ("parent", "child"):
         if getattr(command, name) is not None and getattr(command, f"{name}_behavior") is not None:
             raise NichechainError(f"--{name} and --{name}-behavior exclude each other: give one of them")
-    from nichechain.archive import load
-    from nichechain.importing import Axes, Columns, import_births
+    from nichechain.archive.archive import load
+    from nichechain.archive.imported import Axes, Columns, import_births
     from nichechain.niches import GridNiches, parse_bounds, parse_shape
 
     columns = Columns(
@@ -68,7 +68,9 @@ def run(arguments: Sequence[str]) -> int:
         command.elite,
         command.step,
     )
-    niches = GridNiches(parse_shape(command.grid), parse_bounds(command.bounds), command.outside)
+    niches = GridNiches(
+        parse_shape(command.grid, "--grid"), parse_bounds(command.bounds, "--bounds"), command.outside
+    )
     axes = Axes(_words(command.names), command.unit)
     import_births(command.log, command.out, niches, columns=columns, axes=axes)
     counts = load(command.out).counts

@@ -25,8 +25,8 @@ class Info:
 def run(arguments: Sequence[str]) -> int:
     """Say what is in the archive."""
     command = console.parse(Info, arguments)
-    from nichechain import savings
-    from nichechain.archive import load
+    from nichechain.archive.archive import load
+    from nichechain.search import savings
 
     archive = load(command.path)
     saved = savings.read(archive.folder)

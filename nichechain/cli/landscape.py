@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 import tyro
 
 from nichechain.cli import console
-from nichechain.config import BuildConfig, MutationName
-from nichechain.errors import NichechainError
+from nichechain.core.errors import NichechainError
+from nichechain.search.config import BuildConfig, MutationName
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from nichechain.archive import Archive
+    from nichechain.archive.archive import Archive
     from nichechain.landscape import Landscape, Measure
 
 TABLES = (".csv", ".parquet")
@@ -79,11 +79,12 @@ def run(arguments: Sequence[str]) -> int:
     """Measure, write, and say what came of it."""
     command = console.parse(LandscapeCommand, arguments, name="landscape")
     from nichechain import execution
-    from nichechain.archive import load
-    from nichechain.coverage import check_lengths
+    from nichechain.archive.archive import load
+    from nichechain.evolvability.coverage import check_lengths
     from nichechain.landscape import find_measure, find_measures, measure_archive
     from nichechain.landscape.measures import check_sample_size
-    from nichechain.variation import SelfAdaptiveDomain, configured
+    from nichechain.search.making import make_mutation
+    from nichechain.variation import SelfAdaptiveDomain
 
     check_sample_size(command.offspring)
     check_lengths(command.l, command.lineages)
@@ -109,7 +110,7 @@ def run(arguments: Sequence[str]) -> int:
     # Step sizes that are genes come with the archive's own domain; an operator is of the weights' one.
     domain = archive.domain
     weights = domain.domain if isinstance(domain, SelfAdaptiveDomain) else domain
-    _, mutate = configured(_config(command, archive), weights)
+    _, mutate = make_mutation(_config(command, archive), weights)
     measured = len(archive.elites) if command.elites is None else min(command.elites, len(archive.elites))
     total = measured * (1 + command.offspring)
     done = 0
@@ -166,7 +167,7 @@ def _check_out(out: Path) -> None:
 
 def _config(command: LandscapeCommand, archive: Archive) -> BuildConfig:
     """The archive's configuration, with the mutation that is asked for."""
-    from nichechain.variation.configured import parse_step_bound
+    from nichechain.variation.parsing import parse_step_bound
 
     config = archive.config
     if command.mutation is not None and command.mutation != config.mutation:
@@ -181,7 +182,7 @@ def _config(command: LandscapeCommand, archive: Archive) -> BuildConfig:
     if command.step_bound == "none":
         config = replace(config, step_bound=None)
     elif command.step_bound is not None:
-        config = replace(config, step_bound=parse_step_bound(command.step_bound))
+        config = replace(config, step_bound=parse_step_bound(command.step_bound, "--step-bound"))
     return config
 
 
@@ -240,7 +241,7 @@ def _write(
     """Table, summary and maps; the names of the files."""
     import io
 
-    from nichechain.files import write_atomically
+    from nichechain.core.files import write_atomically
 
     if out.suffix.lower() == ".csv":
         table = frame.to_csv(index=False, float_format="%.9g").encode()

@@ -25,8 +25,8 @@ class Merge:
 def run(arguments: Sequence[str]) -> int:
     """Merge."""
     command = console.parse(Merge, arguments)
-    from nichechain.archive import load
-    from nichechain.merging import merge
+    from nichechain.archive.archive import load
+    from nichechain.archive.merge import merge
 
     merge([load(path).folder for path in command.paths], command.out)
     archive = load(command.out)

@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import tyro
 
 from nichechain.cli import console
-from nichechain.errors import NichechainError
+from nichechain.core.errors import NichechainError
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from nichechain.archive import Archive
+    from nichechain.archive.archive import Archive
 
 FORMATS = (".png", ".svg", ".pdf")
 _WITH_THRESHOLD = ("reachability", "classes", "transitions-by-class")
@@ -84,7 +84,7 @@ def run(arguments: Sequence[str]) -> int:
         raise NichechainError(f"--min-births is {command.min_births}, but must not be negative")
     if command.threshold is not None and command.kind not in _WITH_THRESHOLD:
         raise NichechainError(f"--threshold belongs to {', '.join(_WITH_THRESHOLD)}, not to {command.kind}")
-    from nichechain.archive import load
+    from nichechain.archive.archive import load
 
     if command.kind == "reach" and command.niche is None:
         raise NichechainError("--niche is missing, but reach is drawn from a niche, such as --niche 7,11")
@@ -158,9 +158,9 @@ def _draw(command: Plot, archive: Archive, ax: Axes) -> None:
             threshold = 0.05 if command.threshold is None else command.threshold
             plots.plot_reachability(archive, archive.chain(command.estimator), ax, threshold=threshold)
         case "reach":
+            from nichechain.evolvability.reach import reach
             from nichechain.niches import parse_niche
             from nichechain.plots.reach import plot_reach
-            from nichechain.reach import reach
 
             assert command.niche is not None
             chain = archive.chain(command.estimator)
@@ -168,7 +168,7 @@ def _draw(command: Plot, archive: Archive, ax: Axes) -> None:
             found = reach(chain, niche=niche, l=command.l, lineages=command.lineages)
             plot_reach(archive, found, ax, niche=niche)
         case "wormholes":
-            from nichechain.chain.wormholes import wormholes
+            from nichechain.chain.structure.wormholes import wormholes
             from nichechain.plots.wormholes import plot_wormholes
 
             # Broken children all land at the start, which is no secret passage.

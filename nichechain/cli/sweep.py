@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 from nichechain.cli import console
-from nichechain.errors import NichechainError
+from nichechain.core.errors import NichechainError
 
 if TYPE_CHECKING:
-    import nichechain.sweep
+    import nichechain.validation.grid_size
 
 FORMATS = (".png", ".svg", ".pdf")
 
@@ -49,8 +49,8 @@ def run(arguments: Sequence[str]) -> int:
     """Sweep, and say what was found."""
     command = console.parse(Sweep, arguments)
     _check(command)
-    from nichechain.archive import load
-    from nichechain.sweep import sweep
+    from nichechain.archive.archive import load
+    from nichechain.validation.grid_size import sweep
 
     found = sweep(
         load(command.path),
@@ -154,7 +154,7 @@ def _check(command: Sweep) -> None:
             )
 
 
-def _draw(found: nichechain.sweep.Sweep, out: Path) -> None:
+def _draw(found: nichechain.validation.grid_size.Sweep, out: Path) -> None:
     from matplotlib.figure import Figure
 
     from nichechain.plots.sweep import plot_filling, plot_scores, plot_surprise

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 from nichechain.cli import console
-from nichechain.errors import NichechainError
+from nichechain.core.errors import NichechainError
 
 if TYPE_CHECKING:
     from nichechain.validation import Validation, ValidationConfig
@@ -52,7 +52,7 @@ def run(arguments: Sequence[str]) -> int:
     """Validate."""
     command = console.parse(Validate, arguments)
     from nichechain import execution
-    from nichechain.archive import load
+    from nichechain.archive.archive import load
     from nichechain.validation import ValidationConfig, validate
 
     config = ValidationConfig(

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 from nichechain.cli import console
-from nichechain.errors import NichechainError
+from nichechain.core.errors import NichechainError
 
 if TYPE_CHECKING:
     from nichechain.verification import Check, Verification
@@ -56,7 +56,7 @@ def run(arguments: Sequence[str]) -> int:
     """Verify."""
     command = console.parse(Verify, arguments)
     from nichechain import execution
-    from nichechain.archive import load
+    from nichechain.archive.archive import load
     from nichechain.verification import verify
 
     sample = _sample(command.sample)

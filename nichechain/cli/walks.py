@@ -11,18 +11,18 @@ from typing import TYPE_CHECKING, Annotated, Literal, TypeAlias
 import tyro
 
 from nichechain.cli import console
-from nichechain.errors import NichechainError
+from nichechain.core.errors import NichechainError
 
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from nichechain.config import DomainOption
+    from nichechain.core.checks import DomainOption
     from nichechain.domains import Domain
-    from nichechain.experiments.analysis import Analysis
-    from nichechain.experiments.conditions import Condition
-    from nichechain.experiments.studies import Kind, Study
+    from nichechain.studies.analysis import Analysis
+    from nichechain.studies.conditions import Condition
+    from nichechain.studies.study import Kind, Study
 
-# As in nichechain.experiments, which takes longer to import than help should.
+# As in nichechain.studies, which takes longer to import than help should.
 MetricName: TypeAlias = Literal["knn", "knn-no-archive", "parent", "ancestors", "kde"]
 Mode: TypeAlias = Literal["factor", "length"]
 
@@ -100,7 +100,7 @@ class _Walks:
 
     def base(self) -> Condition:
         """What all conditions share."""
-        from nichechain.experiments.conditions import Condition
+        from nichechain.studies.conditions import Condition
 
         names = {field.name for field in fields(Condition)} & {field.name for field in fields(self)}
         return Condition(label="base", **{name: getattr(self, name) for name in names})
@@ -119,7 +119,7 @@ class Pressure(_Walks):
 
     def conditions(self) -> tuple[Condition, ...]:
         """One for each level."""
-        from nichechain.experiments.studies import pressure_conditions
+        from nichechain.studies.study import pressure_conditions
 
         return pressure_conditions(_words(self.levels), self.base())
 
@@ -137,7 +137,7 @@ class Metrics(_Walks):
 
     def conditions(self) -> tuple[Condition, ...]:
         """One for each metric."""
-        from nichechain.experiments.studies import metric_conditions
+        from nichechain.studies.study import metric_conditions
 
         return metric_conditions(_words(self.metrics), self.base())
 
@@ -157,7 +157,7 @@ class Sensitivity(_Walks):
 
     def conditions(self) -> tuple[Condition, ...]:
         """One for each value."""
-        from nichechain.experiments.studies import variations
+        from nichechain.studies.study import variations
 
         return variations(self.vary, self.base())
 
@@ -216,9 +216,9 @@ def _begin(command: Pressure | Metrics | Sensitivity, kind: Kind) -> int:
 
 
 def _resume(command: Resume) -> int:
-    from nichechain.config import BuildConfig
-    from nichechain.experiments.running import read_study
-    from nichechain.trust import check_trusted
+    from nichechain.archive.trust import check_trusted
+    from nichechain.search.config import BuildConfig
+    from nichechain.studies.running import read_study
 
     study = read_study(command.path)
     same = BuildConfig(study.domain, study.shape, study.bounds, domain_options=study.domain_options)
@@ -230,14 +230,14 @@ def _resume(command: Resume) -> int:
 
 def _walk(study: Study, domain: Domain, folder: Path, command: _Walks | Resume) -> int:
     from nichechain import execution
-    from nichechain.experiments import running
+    from nichechain.studies.running import run as walk_study
 
     with execution.make(command.workers, command.cache_memory) as executor:
         with console.spinner("loading the domain"):
             domain.evaluate(domain.sample(1, seed=0))
         try:
             with console.counting(study.evaluations, "evaluations") as tell:
-                running.run(study, folder, executor, domain=domain, on_progress=tell)
+                walk_study(study, folder, executor, domain=domain, on_progress=tell)
         except KeyboardInterrupt:
             console.console().print(
                 f"Stopped; every finished step is kept. To go on:\n  nichechain walks resume {folder}"
@@ -248,9 +248,9 @@ def _walk(study: Study, domain: Domain, folder: Path, command: _Walks | Resume) 
 
 def _report(folder: Path) -> int:
     """Write the report of what is walked so far, and tell what it found."""
-    from nichechain.experiments.findings import find
-    from nichechain.experiments.report import FILES, write_report
-    from nichechain.experiments.running import read_records, read_study, read_unit
+    from nichechain.studies.findings import find
+    from nichechain.studies.report import FILES, write_report
+    from nichechain.studies.running import read_records, read_study, read_unit
 
     study, unit = read_study(folder), read_unit(folder)
     records = read_records(folder, study)
@@ -289,8 +289,8 @@ def _means(analysis: Analysis, unit: str) -> Table:
 def command_of(study: Study, folder: Path) -> str:
     """The command line that asks for a study."""
     from nichechain.cli.build import domain_option_text
-    from nichechain.experiments.conditions import Condition
-    from nichechain.experiments.studies import LEVELS, METRICS, VARIATIONS
+    from nichechain.studies.conditions import Condition
+    from nichechain.studies.study import LEVELS, METRICS, VARIATIONS
 
     base = study.conditions[0]
     labels = [condition.label for condition in study.conditions]
@@ -333,10 +333,10 @@ def _study(
     command: Pressure | Metrics | Sensitivity, kind: Kind, domain: Domain, options: Mapping[str, DomainOption]
 ) -> Study:
     """What is asked for, checked."""
-    from nichechain.experiments.studies import Study
     from nichechain.niches import parse_bounds, parse_shape
+    from nichechain.studies.study import Study
 
-    shape = parse_shape(command.grid)
+    shape = parse_shape(command.grid, "--grid")
     axes = len(domain.behavior_names)
     if len(shape) != axes:
         raise NichechainError(f"--grid is {command.grid!r}, but {command.domain} has {axes} axes of behavior")
@@ -347,7 +347,7 @@ def _study(
         runs=command.runs,
         steps=command.steps,
         shape=shape,
-        bounds=domain.bounds if command.bounds is None else parse_bounds(command.bounds),
+        bounds=domain.bounds if command.bounds is None else parse_bounds(command.bounds, "--bounds"),
         domain_seed=command.domain_seed,
         seed=command.seed,
         paired=command.paired,

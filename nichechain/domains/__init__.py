@@ -8,7 +8,7 @@ from nichechain.domains.descriptors import Episode
 from nichechain.domains.fetch import FetchPickAndPlace, FetchPush, FetchReach, FetchSlide
 from nichechain.domains.gym import GymDomain
 from nichechain.domains.noise import Noise, Noisy, Perturbable, WithSensitivity, noise_sensitivity
-from nichechain.domains.registry import make, names, of
+from nichechain.domains.registry import make, names
 from nichechain.domains.toy import CosinusMap, LinearMap
 
 __all__ = [
@@ -30,5 +30,4 @@ __all__ = [
     "make",
     "names",
     "noise_sensitivity",
-    "of",
 ]

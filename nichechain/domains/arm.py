@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from nichechain.arguments import check_sample, check_seed, check_whole, rng_of
+from nichechain.core.checks import check_sample, check_seed, check_whole, rng_of
+from nichechain.core.errors import NichechainError
 from nichechain.domains.base import Evaluation, check_genotypes
 from nichechain.domains.noise import Noise, check_seeds
-from nichechain.errors import NichechainError
 
 if TYPE_CHECKING:
     from torch import nn

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from nichechain.errors import NichechainError
+from nichechain.core.errors import NichechainError
 
 if TYPE_CHECKING:
     from torch import nn

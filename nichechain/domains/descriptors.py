@@ -13,7 +13,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from nichechain.errors import NichechainError
+from nichechain.core.errors import NichechainError
 
 Floats = NDArray[np.float64]
 

@@ -9,17 +9,17 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from nichechain.arguments import check_seed
-from nichechain.controllers import Controller
+from nichechain.core.checks import check_seed
 from nichechain.domains.base import Evaluation, check_genotypes
 from nichechain.domains.memory import CACHE_MEMORY, check_cache_memory
-from nichechain.domains.networks import network
 from nichechain.domains.noise import Noise, check_seeds
+from nichechain.domains.policies.controllers import Controller
+from nichechain.domains.policies.networks import network
 
 if TYPE_CHECKING:
     from torch import nn
 
-    from nichechain.engine.fetch import Disturbance, Episode, FetchEpisodes
+    from nichechain.domains.engine.fetch import Disturbance, Episode, FetchEpisodes
 
 
 _OUTPUTS = 4
@@ -153,7 +153,7 @@ class FetchTask:
         NichechainError
             If the shape does not fit.
         """
-        from nichechain.engine.fetch import UNDISTURBED
+        from nichechain.domains.engine.fetch import UNDISTURBED
 
         rows = check_genotypes(genotypes, self.genotype_length)
         return self._evaluate(rows, (UNDISTURBED for _ in rows))
@@ -197,7 +197,7 @@ class FetchTask:
         return self.network.module(genotype)
 
     def _disturbance(self, noise: Noise, seed: int) -> Disturbance:
-        from nichechain.engine.fetch import Disturbance
+        from nichechain.domains.engine.fetch import Disturbance
 
         # Always the same draws, so that one kind of noise does not change what another one does.
         rng = np.random.default_rng(seed)
@@ -237,7 +237,7 @@ class FetchTask:
         if self._episodes_made is None:
             with self._lock:
                 if self._episodes_made is None:
-                    from nichechain.engine.fetch import fetch_episodes
+                    from nichechain.domains.engine.fetch import fetch_episodes
 
                     self._episodes_made = fetch_episodes(
                         self.env_id, self.seed, self.network, self._cache_memory

@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from nichechain.arguments import as_bounds, check_seed, check_whole
-from nichechain.controllers import MLP, Controller
+from nichechain.core.checks import as_bounds, check_seed, check_whole
+from nichechain.core.errors import NichechainError
 from nichechain.domains.base import Evaluation, check_genotypes
 from nichechain.domains.descriptors import Descriptor, Episode, FinalObservation, MeanObservation, named
-from nichechain.domains.networks import network
 from nichechain.domains.noise import Noise, average, check_repeats, check_seeds, evaluation_seeds
-from nichechain.domains.spaces import Actions, Observations, actions_of
-from nichechain.errors import NichechainError
+from nichechain.domains.policies.controllers import MLP, Controller
+from nichechain.domains.policies.networks import network
+from nichechain.domains.policies.spaces import Actions, Observations, actions_of
 from nichechain.niches import parse_bounds
 from nichechain.niches.base import check_bounds
 
@@ -55,7 +55,7 @@ class GymDomain:
     unit : str
         Of behavior.
     controller : torch.nn.Module or str
-        Such as ``"mlp:64,64"``: see :func:`nichechain.domains.networks.network`.
+        Such as ``"mlp:64,64"``: see :func:`nichechain.domains.policies.networks.network`.
     steps : int, optional
         Actions of an episode at most; by default the limit that the environment is registered
         with.
@@ -357,7 +357,7 @@ def _policy(controller: Controller, genotype: Float32s) -> Act:
     if not isinstance(controller, MLP):
         policy = controller.policy(genotype)
         return lambda observation: policy(observation[None])[0]
-    from nichechain.engine.policy import forward
+    from nichechain.domains.engine.policy import forward
 
     parameters = controller.parameters(genotype)
     sizes, activations = np.array(controller.sizes), controller.activations
@@ -398,6 +398,6 @@ def _physics_failure(env: Any) -> str:
     """What MuJoCo found wrong, if the environment is one of its."""
     if not hasattr(getattr(env, "data", None), "warning"):
         return ""
-    from nichechain.engine.fetch import physics_failure
+    from nichechain.domains.engine.fetch import physics_failure
 
     return physics_failure(env.data)

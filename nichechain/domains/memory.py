@@ -5,9 +5,9 @@ from __future__ import annotations
 import re
 from typing import Any
 
-from nichechain.arguments import check_whole
+from nichechain.core.checks import check_whole
+from nichechain.core.errors import NichechainError
 from nichechain.domains.wrapper import Wrapper
-from nichechain.errors import NichechainError
 
 CACHE_MEMORY = 2 * 2**30
 """Bytes of the cache of a process, unless told otherwise: suits 24 GiB and what else runs there."""

@@ -15,10 +15,10 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from nichechain.arguments import check_numbers, check_whole
+from nichechain.core.checks import check_numbers, check_whole
+from nichechain.core.errors import NichechainError
 from nichechain.domains.base import Domain, Evaluation, check_genotypes
 from nichechain.domains.wrapper import Wrapper
-from nichechain.errors import NichechainError
 
 Floats = NDArray[np.float64]
 Seeds = NDArray[np.int64]

@@ -11,14 +11,14 @@ from collections.abc import Callable
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any
 
-from nichechain.config import BuildConfig, DomainOption
+from nichechain.core.checks import DomainOption
+from nichechain.core.errors import NichechainError
 from nichechain.domains.arm import PlanarArm
 from nichechain.domains.base import Domain
 from nichechain.domains.fetch import FetchPickAndPlace, FetchPush, FetchReach, FetchSlide
 from nichechain.domains.gym import PREFIX, GymDomain
 from nichechain.domains.noise import Noise, Noisy, WithSensitivity
 from nichechain.domains.toy import CosinusMap, LinearMap
-from nichechain.errors import NichechainError
 
 GROUP = "nichechain.domains"
 COMMON_OPTIONS = ("noise", "repeats", "axes", "most_sensitivity")
@@ -92,17 +92,6 @@ def make(name: str, *, seed: int = 0, **options: DomainOption) -> Domain:
             raise
         raise NichechainError(f"options {given} do not fit {name}: {error}") from error
     return domain
-
-
-def of(config: BuildConfig) -> Domain:
-    """The domain of a build.
-
-    Raises
-    ------
-    NichechainError
-        If there is none of its name here, or it has no such options.
-    """
-    return make(config.domain, seed=config.domain_seed, **config.domain_options)
 
 
 def _entry_points() -> dict[str, EntryPoint]:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from nichechain.arguments import check_sample, check_seed, rng_of
+from nichechain.core.checks import check_sample, check_seed, rng_of
 from nichechain.domains.base import Evaluation, check_genotypes
 from nichechain.domains.noise import Noise, check_seeds
 
@@ -24,7 +24,7 @@ class ToyMap:
     """A map from the genome (g0, g1) in [-5, 5]² to a behavior in [-5, 5].
 
     A genome outside of the square is read as the nearest in it, so that any mutation operator may
-    be used; :class:`nichechain.polynomial.PolynomialMutation`, that of the study, stays inside.
+    be used; :class:`nichechain.variation.polynomial.PolynomialMutation`, that of the study, stays inside.
 
     Parameters
     ----------

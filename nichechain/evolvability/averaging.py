@@ -9,13 +9,13 @@ from typing import Literal, TypeAlias, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from nichechain.arguments import check_whole
-from nichechain.chain.draws import generations
 from nichechain.chain.model import Matrix, NicheChain
-from nichechain.coverage import check_lengths, expected_coverage, sampled_coverage
-from nichechain.errors import NichechainError
+from nichechain.core.checks import check_whole
+from nichechain.core.errors import NichechainError
+from nichechain.core.randomness import Purpose, keyed
+from nichechain.evolvability.coverage import check_lengths, expected_coverage, sampled_coverage
 from nichechain.evolvability.results import Evolvability
-from nichechain.randomness import Purpose, keyed
+from nichechain.evolvability.roots import generations
 
 Floats = NDArray[np.float64]
 Sample: TypeAlias = tuple[Matrix, Floats]

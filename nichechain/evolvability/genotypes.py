@@ -12,11 +12,10 @@ from typing import TYPE_CHECKING, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from nichechain.arguments import check_numbers, check_whole
-from nichechain.chain.draws import Root, transition_draws
 from nichechain.chain.model import NicheChain
-from nichechain.coverage import rarefied_coverage
-from nichechain.errors import NichechainError
+from nichechain.core.checks import check_numbers, check_whole
+from nichechain.core.errors import NichechainError
+from nichechain.core.randomness import Purpose, keyed
 from nichechain.evolvability.averaging import (
     DRAWS,
     Convention,
@@ -25,11 +24,12 @@ from nichechain.evolvability.averaging import (
     check,
     one_root,
 )
+from nichechain.evolvability.coverage import rarefied_coverage
 from nichechain.evolvability.results import Evolvability
-from nichechain.randomness import Purpose, keyed
+from nichechain.evolvability.roots import Root, transition_draws
 
 if TYPE_CHECKING:
-    from nichechain.archive import Archive, Elite
+    from nichechain.archive.archive import Archive, Elite
     from nichechain.execution import Executor
 
 FirstGeneration = Literal["posterior", "empirical"]

@@ -8,9 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
-from nichechain.chain.draws import Root, generations, transition_draws
 from nichechain.chain.model import Matrix, NicheChain
-from nichechain.coverage import expected_coverage, sampled_coverage
+from nichechain.core.randomness import Purpose, keyed
 from nichechain.evolvability.averaging import (
     DRAWS,
     ENDLESS,
@@ -23,9 +22,10 @@ from nichechain.evolvability.averaging import (
     standard_error,
     summary,
 )
+from nichechain.evolvability.coverage import expected_coverage, sampled_coverage
 from nichechain.evolvability.results import Evolvability, NicheEvolvability
+from nichechain.evolvability.roots import Root, generations, transition_draws
 from nichechain.niches import Niche
-from nichechain.randomness import Purpose, keyed
 
 Floats = NDArray[np.float64]
 

@@ -8,9 +8,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from nichechain.arguments import check_whole
 from nichechain.chain.model import NicheChain
-from nichechain.notebook import facts_table
+from nichechain.core.checks import check_whole
+from nichechain.core.notebook import facts_table
 
 Floats = NDArray[np.float64]
 

@@ -13,18 +13,18 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from nichechain.arguments import check_numbers, check_whole
 from nichechain.chain.base_measure import BaseMeasure
-from nichechain.chain.comparison import counts_of_families, families_of
 from nichechain.chain.counts import TransitionCounts
 from nichechain.chain.empirical_bayes import design_effect, most_likely
 from nichechain.chain.estimators import with_posterior
+from nichechain.chain.families import counts_of_families, families_of
 from nichechain.chain.model import NicheChain
 from nichechain.chain.posterior import DirichletPosterior
-from nichechain.errors import NichechainError
+from nichechain.core.checks import check_numbers, check_whole
+from nichechain.core.errors import NichechainError
+from nichechain.core.randomness import Purpose, keyed
 from nichechain.evolvability.averaging import DRAWS, Convention
 from nichechain.evolvability.niches import niche_evolvability
-from nichechain.randomness import Purpose, keyed
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

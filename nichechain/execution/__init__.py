@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from contextlib import AbstractContextManager
 
+from nichechain.core.errors import NichechainError
 from nichechain.domains.memory import parse_memory
-from nichechain.errors import NichechainError
 from nichechain.execution.base import WORKER_DIED, Executor, available_cpus, evaluate_rows
 from nichechain.execution.processes import Processes
 from nichechain.execution.ray import Ray

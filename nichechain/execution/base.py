@@ -11,9 +11,9 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from nichechain.arguments import check_whole
+from nichechain.core.checks import check_whole
+from nichechain.core.errors import NichechainError
 from nichechain.domains.base import Domain, Evaluation
-from nichechain.errors import NichechainError
 
 WORKER_DIED = "worker died"
 """Why a row failed that no worker outlives."""

@@ -16,9 +16,9 @@ from typing import NoReturn, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from nichechain.core.errors import NichechainError
 from nichechain.domains.base import Domain, Evaluation
 from nichechain.domains.memory import cache_memory_of, check_cache_memory, limit_cache
-from nichechain.errors import NichechainError
 from nichechain.execution.base import WORKER_DIED, all_failed, evaluate_rows
 from nichechain.execution.pieces import LOSSES, Piece, Pieces
 

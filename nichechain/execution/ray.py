@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from nichechain.errors import NichechainError
+from nichechain.core.errors import NichechainError
 from nichechain.execution.base import available_cpus
 from nichechain.execution.fleet import Fleet, Outcome, Workbench, Worker
 

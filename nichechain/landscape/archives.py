@@ -12,8 +12,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from nichechain.arguments import as_floats, check_numbers, check_seed, check_whole
-from nichechain.errors import NichechainError
+from nichechain.core.checks import as_floats, check_numbers, check_seed, check_whole
+from nichechain.core.errors import NichechainError
+from nichechain.core.randomness import Purpose, keyed
 from nichechain.landscape.behaviors import (
     expected_global_sensitivity,
     expected_local_sensitivity,
@@ -23,12 +24,11 @@ from nichechain.landscape.dissimila import QUANTILES, Dissimila, find_dissimila
 from nichechain.landscape.measures import MEASURES, Measures, check_sample_size, measure_behaviors
 from nichechain.landscape.sampling import Kept, operator_digest, sample_families
 from nichechain.niches import Niches
-from nichechain.randomness import Purpose, keyed
 from nichechain.variation import AdditiveMutation, Mutation, SelfAdaptiveMutation
 from nichechain.variation.noise import BallNoise
 
 if TYPE_CHECKING:
-    from nichechain.archive import Archive
+    from nichechain.archive.archive import Archive
     from nichechain.execution import Executor
 
 Floats = NDArray[np.float64]
@@ -330,8 +330,7 @@ def is_bounded(mutate: Mutation) -> bool:
 
 def _provenance(archive: Archive, mutate: Mutation, offspring: int, seed: int) -> dict[str, Any]:
     """What shapes the behaviors of a family besides its parent."""
-    from nichechain.provenance import machine
-    from nichechain.store import library_versions
+    from nichechain.core.machine import library_versions, machine
 
     config = archive.config
     return {

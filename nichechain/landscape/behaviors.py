@@ -13,10 +13,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from nichechain.arguments import as_floats, as_whole, check_numbers, check_whole
-from nichechain.births import NONE
-from nichechain.diversity.arrays import ordered_sum, present
-from nichechain.errors import NichechainError
+from nichechain.births.table import NONE
+from nichechain.core.arrays import ordered_sum, present
+from nichechain.core.checks import as_floats, as_whole, check_numbers, check_whole
+from nichechain.core.errors import NichechainError
 
 Floats = NDArray[np.float64]
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from nichechain.arguments import as_floats, check_numbers
-from nichechain.errors import NichechainError
+from nichechain.core.checks import as_floats, check_numbers
+from nichechain.core.errors import NichechainError
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from nichechain.arguments import as_floats
-from nichechain.births import NONE
+from nichechain.births.table import NONE
+from nichechain.core.checks import as_floats
+from nichechain.core.errors import NichechainError
+from nichechain.core.randomness import Purpose, keyed
 from nichechain.domains.base import Domain, Evaluation, check_genotypes
-from nichechain.errors import NichechainError
 from nichechain.landscape.behaviors import EPSILON
 from nichechain.landscape.measures import check_sample_size, measure_behaviors
-from nichechain.randomness import Purpose, keyed
 from nichechain.variation import Mutation
 
 if TYPE_CHECKING:

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from nichechain.arguments import as_floats, check_whole
-from nichechain.births import NONE
-from nichechain.diversity.arrays import present
-from nichechain.errors import NichechainError
+from nichechain.births.table import NONE
+from nichechain.core.arrays import present
+from nichechain.core.checks import as_floats, check_whole
+from nichechain.core.errors import NichechainError
 from nichechain.landscape.behaviors import (
     EPSILON,
     dissimila_ratio,

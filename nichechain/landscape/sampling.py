@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from nichechain.core.errors import NichechainError
+from nichechain.core.files import write_atomically
 from nichechain.domains.base import Domain
-from nichechain.errors import NichechainError
-from nichechain.files import write_atomically
 from nichechain.landscape.genotypes import make_offspring
 from nichechain.variation import Mutation
 

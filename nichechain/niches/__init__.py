@@ -5,7 +5,6 @@ from __future__ import annotations
 from nichechain.niches.base import OUTSIDE_MODES, Niche, Niches
 from nichechain.niches.cvt import CVTNiches
 from nichechain.niches.grid import GridNiches
-from nichechain.niches.making import check, make
 from nichechain.niches.one_hot import one_hot
 from nichechain.niches.parsing import parse_bounds, parse_niche, parse_niches, parse_shape
 
@@ -15,8 +14,6 @@ __all__ = [
     "GridNiches",
     "Niche",
     "Niches",
-    "check",
-    "make",
     "one_hot",
     "parse_bounds",
     "parse_niche",

@@ -7,8 +7,8 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from nichechain.arguments import as_floats
-from nichechain.errors import NichechainError
+from nichechain.core.checks import as_floats
+from nichechain.core.errors import NichechainError
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nichechain.arguments import as_bounds, as_floats, check_whole
-from nichechain.errors import NichechainError
+from nichechain.core.checks import as_bounds, as_floats, check_whole
+from nichechain.core.errors import NichechainError
+from nichechain.core.randomness import Purpose, keyed
 from nichechain.niches.base import (
     MOST_NICHES,
     Bounds,
@@ -23,7 +24,6 @@ from nichechain.niches.base import (
     checked_behavior,
     is_inside,
 )
-from nichechain.randomness import Purpose, keyed
 
 if TYPE_CHECKING:
     from scipy.spatial import KDTree

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from nichechain.arguments import as_bounds, as_shape
-from nichechain.errors import NichechainError
+from nichechain.core.checks import as_bounds, as_shape
+from nichechain.core.errors import NichechainError
 from nichechain.niches.base import (
     MOST_NICHES,
     Floats,

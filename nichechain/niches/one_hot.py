@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nichechain.arguments import as_floats
+from nichechain.core.checks import as_floats
 from nichechain.niches.base import Floats, Niches
 
 

@@ -1,4 +1,4 @@
-"""Niches as the command line writes them."""
+"""Niches out of text; errors use the name that the caller gives."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from nichechain.errors import NichechainError
+from nichechain.core.errors import NichechainError
 
 
-def parse_shape(text: str) -> tuple[int, ...]:
+def parse_shape(text: str, name: str = "shape") -> tuple[int, ...]:
     """``"20x20"`` as ``(20, 20)``.
 
     Raises
@@ -23,12 +23,12 @@ def parse_shape(text: str) -> tuple[int, ...]:
         shape = ()
     if not shape or min(shape) < 1:
         raise NichechainError(
-            f"--grid is {text!r}, but must be cells per axis such as 20x20, each at least 1"
+            f"{name} is {text!r}, but must be cells per axis such as 20x20, each at least 1"
         )
     return shape
 
 
-def parse_bounds(text: str) -> tuple[tuple[float, float], ...]:
+def parse_bounds(text: str, name: str = "bounds") -> tuple[tuple[float, float], ...]:
     """``"1.05,1.55,0.4,1.1"`` as ``((1.05, 1.55), (0.4, 1.1))``.
 
     Raises
@@ -44,13 +44,12 @@ def parse_bounds(text: str) -> tuple[tuple[float, float], ...]:
     finite = all(np.isfinite(values))
     if not values or len(values) % 2 or not finite or any(low >= high for low, high in pairs):
         raise NichechainError(
-            f"--bounds is {text!r}, but must be X0,X1,Y0,Y1 with X0 < X1 and Y0 < Y1, "
-            "such as 1.05,1.55,0.4,1.1"
+            f"{name} is {text!r}, but must be X0,X1,Y0,Y1 with X0 < X1 and Y0 < Y1, such as 1.05,1.55,0.4,1.1"
         )
     return pairs
 
 
-def parse_niche(text: str, option: str) -> tuple[int, ...] | int:
+def parse_niche(text: str, name: str = "niche") -> tuple[int, ...] | int:
     """``"7,11"`` as ``(7, 11)``, ``"151"`` as ``151``.
 
     Raises
@@ -62,12 +61,12 @@ def parse_niche(text: str, option: str) -> tuple[int, ...] | int:
         index = tuple(int(part) for part in text.split(","))
     except ValueError:
         raise NichechainError(
-            f"{option} is {text!r}, but must be a grid index such as 7,11 or a niche number such as 151"
+            f"{name} is {text!r}, but must be a grid index such as 7,11 or a niche number such as 151"
         ) from None
     return index if len(index) > 1 else index[0]
 
 
-def parse_niches(text: str) -> int:
+def parse_niches(text: str, name: str = "niches") -> int:
     """``"cvt:400"`` as 400.
 
     Raises
@@ -77,7 +76,5 @@ def parse_niches(text: str) -> int:
     """
     kind, _, number = text.partition(":")
     if kind != "cvt" or not number.isdecimal() or int(number) < 1:
-        raise NichechainError(
-            f"--niches is {text!r}, but must be cvt and a number of niches such as cvt:400; a grid is --grid"
-        )
+        raise NichechainError(f"{name} is {text!r}, but must be cvt and a number of niches such as cvt:400")
     return int(number)

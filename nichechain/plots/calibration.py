@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nichechain.arguments import check_whole
-from nichechain.errors import NichechainError
+from nichechain.core.checks import check_whole
+from nichechain.core.errors import NichechainError
 from nichechain.plots.style import EDGE, FAINT, INK, LONG_JUMP
 
 if TYPE_CHECKING:

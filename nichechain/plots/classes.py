@@ -8,15 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from nichechain.chain.analysis import communicating_classes, recurrent_classes
-from nichechain.errors import NichechainError
+from nichechain.chain.structure.classes import communicating_classes, recurrent_classes
+from nichechain.core.errors import NichechainError
 from nichechain.plots.cells import cells_along, fill, hatch
 from nichechain.plots.style import EDGE, EMPTY, INK, LONG_JUMP, START, behavior_axes, colorbar, key
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from nichechain.archive import Archive
+    from nichechain.archive.archive import Archive
     from nichechain.chain import NicheChain
 
 Ints = NDArray[np.int64]

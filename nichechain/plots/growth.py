@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from nichechain.arguments import check_whole
-from nichechain.chain.draws import transition_draws
 from nichechain.chain.model import NicheChain
-from nichechain.coverage import coverage_by_generation
-from nichechain.errors import NichechainError
+from nichechain.core.checks import check_whole
+from nichechain.core.errors import NichechainError
 from nichechain.evolvability.averaging import ENDLESS, SATURATED
+from nichechain.evolvability.coverage import coverage_by_generation
+from nichechain.evolvability.roots import transition_draws
 from nichechain.niches import Niche
 from nichechain.plots.style import EDGE, INK, LONG_JUMP, START
 

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from nichechain.archive import Archive
+    from nichechain.archive.archive import Archive
 
 MAPS = (
     "local_sensitivity",

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from nichechain.arguments import check_whole
+from nichechain.core.checks import check_whole
 from nichechain.plots.cells import fill, hatch
 from nichechain.plots.style import EMPTY, behavior_axes, colorbar, key, on_map
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.collections import Collection
     from matplotlib.colors import Normalize
 
-    from nichechain.archive import Archive
+    from nichechain.archive.archive import Archive
     from nichechain.evolvability import NicheEvolvability
 
 

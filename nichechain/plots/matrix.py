@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy import sparse
 
-from nichechain.errors import NichechainError
+from nichechain.core.errors import NichechainError
 from nichechain.niches import GridNiches
 from nichechain.plots.cells import cells_along
 from nichechain.plots.style import EMPTY, INK, colorbar
@@ -15,7 +15,7 @@ from nichechain.plots.style import EMPTY, INK, colorbar
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from nichechain.archive import Archive
+    from nichechain.archive.archive import Archive
     from nichechain.chain import NicheChain
     from nichechain.niches import Niches
 

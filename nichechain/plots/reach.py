@@ -10,9 +10,9 @@ from nichechain.plots.style import EMPTY, INK, behavior_axes, colorbar, key
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from nichechain.archive import Archive
+    from nichechain.archive.archive import Archive
+    from nichechain.evolvability.reach import Reach
     from nichechain.niches import Niche
-    from nichechain.reach import Reach
 
 
 def plot_reach(archive: Archive, reach: Reach, ax: Axes, *, niche: Niche | None = None) -> Axes:
@@ -24,7 +24,7 @@ def plot_reach(archive: Archive, reach: Reach, ax: Axes, *, niche: Niche | None 
     ----------
     archive : Archive
     reach : Reach
-        From :func:`nichechain.reach.reach`.
+        From :func:`nichechain.evolvability.reach.reach`.
     ax : matplotlib.axes.Axes
     niche : int or tuple of int, optional
         Where the root stands, to frame it.

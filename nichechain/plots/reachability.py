@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     import networkx as nx
     from matplotlib.axes import Axes
 
-    from nichechain.archive import Archive
+    from nichechain.archive.archive import Archive
     from nichechain.chain import NicheChain
 
 _WIDEST = 3.0

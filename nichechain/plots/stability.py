@@ -9,7 +9,7 @@ from nichechain.plots.style import EDGE, FAINT, INK, LONG_JUMP
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from nichechain.chain.stability import RankStability
+    from nichechain.validation.stability import RankStability
 
 
 def plot_stability(stability: RankStability, ax: Axes) -> Axes:
@@ -24,7 +24,7 @@ def plot_stability(stability: RankStability, ax: Axes) -> Axes:
     -------
     matplotlib.axes.Axes
     """
-    from nichechain.chain.stability import ENOUGH
+    from nichechain.validation.stability import ENOUGH
 
     frame = stability.to_frame()
     ax.fill_between(frame["births"], frame["lowest"], frame["highest"], color=EDGE, alpha=0.2, linewidth=0)

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from nichechain.errors import NichechainError
+from nichechain.core.errors import NichechainError
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.cm import ScalarMappable
 
-    from nichechain.archive import Archive
+    from nichechain.archive.archive import Archive
 
 Floats = NDArray[np.float64]
 

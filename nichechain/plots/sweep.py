@@ -9,7 +9,7 @@ from nichechain.plots.style import EDGE, FAINT, INK, LONG_JUMP, START
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from nichechain.sweep import Sweep
+    from nichechain.validation.grid_size import Sweep
 
 _GREEN = "#4f8a5b"
 

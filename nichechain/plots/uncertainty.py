@@ -6,14 +6,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nichechain.errors import NichechainError
+from nichechain.core.errors import NichechainError
 from nichechain.plots.cells import fill
 from nichechain.plots.style import EMPTY, behavior_axes, colorbar, key
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from nichechain.archive import Archive
+    from nichechain.archive.archive import Archive
     from nichechain.evolvability import NicheEvolvability
 
 

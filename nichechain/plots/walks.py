@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from nichechain.errors import NichechainError
+from nichechain.core.errors import NichechainError
+from nichechain.core.intervals import mean_interval
 from nichechain.plots.style import FAINT, INK
 
 if TYPE_CHECKING:
@@ -81,7 +82,7 @@ def plot_walks(
     Parameters
     ----------
     records : DataFrame
-        Of :func:`nichechain.experiments.read_records`.
+        Of :func:`nichechain.studies.read_records`.
     ax : matplotlib.axes.Axes
     measure : str
         One of :data:`MEASURES`.
@@ -105,8 +106,6 @@ def plot_walks(
     -----
     Source: the paper's figures of both experiments. A condition with a single run has no band.
     """
-    from nichechain.experiments.statistics import mean_interval
-
     labels = _labels(records, measure, conditions)
     for place, (label, style) in enumerate(line_styles(labels, ordered=ordered).items()):
         table = _pivot(records, label, measure)

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
-    from nichechain.archive import Archive
+    from nichechain.archive.archive import Archive
 
 _WIDEST = 3.0
 _BEND = 0.15
@@ -30,7 +30,7 @@ def plot_wormholes(archive: Archive, found: pd.DataFrame, ax: Axes) -> Axes:
     ----------
     archive : Archive
     found : pandas.DataFrame
-        From :func:`nichechain.chain.wormholes.wormholes`; only flagged rows are drawn.
+        From :func:`nichechain.chain.structure.wormholes.wormholes`; only flagged rows are drawn.
     ax : matplotlib.axes.Axes
 
     Returns

@@ -8,16 +8,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pyarrow as pa
 
-from nichechain.births import NONE, Offspring, table
+from nichechain.archive.imported import Axes, write_archive
+from nichechain.births.table import NONE, Offspring, table
+from nichechain.core.errors import NichechainError
 from nichechain.domains.base import Evaluation
-from nichechain.errors import NichechainError
-from nichechain.illumination import Elites, SearchState
-from nichechain.importing import Axes, write_archive
 from nichechain.pyribs.recording import Recording
 from nichechain.pyribs.translation import empty_archive, niches_of
+from nichechain.search.elites import Elites, SearchState
 
 if TYPE_CHECKING:
-    from nichechain.archive import Archive
+    from nichechain.archive.archive import Archive
 
 
 def from_ribs(
@@ -55,7 +55,7 @@ def from_ribs(
     """
     import ribs
 
-    from nichechain.archive import load
+    from nichechain.archive.archive import load
 
     if isinstance(source, Recording):
         archive, niches, rows = source.archive, source.niches, source.births()

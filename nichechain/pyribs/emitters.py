@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from ribs.emitters import EmitterBase
 
-from nichechain.arguments import as_floats, check_seed, check_whole
-from nichechain.errors import NichechainError
+from nichechain.core.checks import as_floats, check_seed, check_whole
+from nichechain.core.errors import NichechainError
 from nichechain.variation import Mutation
 
 

@@ -12,9 +12,9 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from nichechain import births
-from nichechain.births import NONE, Offspring
+from nichechain.births.table import NONE, Offspring
+from nichechain.core.errors import NichechainError
 from nichechain.domains.base import Evaluation
-from nichechain.errors import NichechainError
 from nichechain.niches import Niches
 from nichechain.pyribs.strategies import StrategyParent, centre, is_strategy
 from nichechain.pyribs.translation import niches_of
@@ -146,7 +146,7 @@ class Recording:
         return len(self._niche)
 
     def births(self) -> pa.Table:
-        """The births so far, with the columns of :mod:`nichechain.births`."""
+        """The births so far, with the columns of :mod:`nichechain.births.table`."""
         empty = births.schema(self.archive.measure_dim).empty_table()
         return pa.concat_tables([empty, *self._tables])
 

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from nichechain.births import NONE
-from nichechain.errors import NichechainError
+from nichechain.births.table import NONE
+from nichechain.core.errors import NichechainError
 
 Ints = NDArray[np.int64]
 

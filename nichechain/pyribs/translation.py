@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from nichechain.errors import NichechainError
+from nichechain.core.errors import NichechainError
 from nichechain.niches import CVTNiches, GridNiches, Niches
 
 

@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from nichechain.births import NONE
-from nichechain.errors import NichechainError
-from nichechain.randomness import Purpose, keyed
+from nichechain.births.table import NONE
+from nichechain.core.errors import NichechainError
+from nichechain.core.randomness import Purpose, keyed
 from nichechain.validation.lineages import Triples
 from nichechain.validation.markov import PERMUTATIONS, MarkovTest, check_permutations, p_value
 

@@ -16,13 +16,13 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy import stats
 
-from nichechain.arguments import check_whole
-from nichechain.births import NONE
+from nichechain.births.table import NONE
 from nichechain.chain.model import Matrix, NicheChain
-from nichechain.coverage import expected_coverage, rarefied_coverage
-from nichechain.errors import NichechainError
+from nichechain.core.checks import check_whole
+from nichechain.core.errors import NichechainError
+from nichechain.core.randomness import Purpose, keyed
+from nichechain.evolvability.coverage import expected_coverage, rarefied_coverage
 from nichechain.niches import Niches
-from nichechain.randomness import Purpose, keyed
 from nichechain.validation.rollouts import Lineages, niches_reached
 from nichechain.validation.simulate import RowSampler, simulate_lineages
 

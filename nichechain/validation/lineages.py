@@ -8,8 +8,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from nichechain.births import NONE
-from nichechain.errors import NichechainError
+from nichechain.births.table import NONE
+from nichechain.core.errors import NichechainError
 
 Ints = NDArray[np.int64]
 
@@ -50,7 +50,7 @@ class Triples:
         Parameters
         ----------
         births : DataFrame
-            Columns of :mod:`nichechain.births`, the births of every parent among them. Rows may
+            Columns of :mod:`nichechain.births.table`, the births of every parent among them. Rows may
             come in any order, and runs are kept apart.
 
         Raises

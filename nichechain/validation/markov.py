@@ -15,9 +15,9 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from nichechain.arguments import check_whole
-from nichechain.errors import NichechainError
-from nichechain.randomness import Purpose, keyed
+from nichechain.core.checks import check_whole
+from nichechain.core.errors import NichechainError
+from nichechain.core.randomness import Purpose, keyed
 from nichechain.validation.lineages import Triples
 
 Floats = NDArray[np.float64]

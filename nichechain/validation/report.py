@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from nichechain.archive import Archive
-from nichechain.arguments import check_seed, check_whole
-from nichechain.errors import NichechainError
+from nichechain.archive.archive import Archive
+from nichechain.core.checks import check_seed, check_whole
+from nichechain.core.errors import NichechainError
 from nichechain.execution import Executor
 from nichechain.validation import chapman_kolmogorov
 from nichechain.validation.direct import DirectCheck, compare

@@ -9,15 +9,15 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from nichechain.archive import Archive
-from nichechain.arguments import check_whole
-from nichechain.births import NONE
+from nichechain.archive.archive import Archive
+from nichechain.births.table import NONE
 from nichechain.chain.model import NicheChain
-from nichechain.coverage import check_lengths
-from nichechain.errors import NichechainError
+from nichechain.core.checks import check_whole
+from nichechain.core.errors import NichechainError
+from nichechain.core.randomness import Purpose, keyed
 from nichechain.evolvability import niche_evolvability
+from nichechain.evolvability.coverage import check_lengths
 from nichechain.execution import Executor
-from nichechain.randomness import Purpose, keyed
 
 Float32s = NDArray[np.float32]
 Ints = NDArray[np.int64]

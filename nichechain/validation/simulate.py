@@ -6,11 +6,11 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
-from nichechain.arguments import as_whole, check_numbers, check_whole
-from nichechain.births import NONE
+from nichechain.births.table import NONE
 from nichechain.chain.model import Matrix, NicheChain
-from nichechain.coverage import entries
-from nichechain.errors import NichechainError
+from nichechain.core.checks import as_whole, check_numbers, check_whole
+from nichechain.core.errors import NichechainError
+from nichechain.evolvability.coverage import entries
 
 Ints = NDArray[np.int64]
 
@@ -47,7 +47,7 @@ def simulate_births(
     Returns
     -------
     DataFrame
-        The columns of :mod:`nichechain.births` that lineages are joined by.
+        The columns of :mod:`nichechain.births.table` that lineages are joined by.
 
     Raises
     ------

@@ -9,9 +9,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from nichechain.errors import NichechainError
+from nichechain.core.errors import NichechainError
 from nichechain.variation.additive import BOUND_KINDS, AdditiveMutation, Bound, Mutation
-from nichechain.variation.configured import configured
 from nichechain.variation.noise import BallNoise, CauchyNoise, GaussianNoise, Noise, StudentTNoise
 from nichechain.variation.self_adaptive import SelfAdaptiveDomain, SelfAdaptiveMutation
 
@@ -23,7 +22,6 @@ __all__ = [
     "SelfAdaptiveDomain",
     "SelfAdaptiveMutation",
     "cauchy",
-    "configured",
     "gaussian",
     "make",
     "noise_of",

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Protocol, runtime_checkable
 
+from nichechain.core.errors import NichechainError
 from nichechain.domains.base import Domain
 from nichechain.domains.wrapper import Wrapper
-from nichechain.errors import NichechainError
 
 
 @runtime_checkable
@@ -23,7 +23,7 @@ def layers_of(domain: Domain) -> tuple[int, ...]:
     """Evolved parameters of each layer of a domain's controller.
 
     A domain tells its layers by a property ``layers``, or by a ``network`` that has one, such as
-    :class:`nichechain.controllers.MLP`.
+    :class:`nichechain.domains.policies.controllers.MLP`.
 
     Raises
     ------

@@ -8,8 +8,8 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
-from nichechain.arguments import check_numbers
-from nichechain.errors import NichechainError
+from nichechain.core.checks import check_numbers
+from nichechain.core.errors import NichechainError
 
 Floats = NDArray[np.float64]
 

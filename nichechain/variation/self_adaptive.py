@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from nichechain.arguments import check_numbers, check_whole
+from nichechain.core.checks import check_numbers, check_whole
+from nichechain.core.errors import NichechainError
 from nichechain.domains.base import Domain, Evaluation, check_genotypes
 from nichechain.domains.wrapper import Wrapper
-from nichechain.errors import NichechainError
 from nichechain.variation.additive import Bound, Genotype, add_noise, check_bound
 from nichechain.variation.noise import Noise
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from nichechain.births import NONE
+from nichechain.births.table import NONE
 from nichechain.domains.base import Domain, Evaluation
 from nichechain.execution import Executor
 from nichechain.niches import Niches

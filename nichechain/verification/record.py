@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from nichechain.births import NONE, Offspring
-from nichechain.illumination import Elites
+from nichechain.births.table import NONE, Offspring
 from nichechain.niches import Niches
+from nichechain.search.elites import Elites
 from nichechain.verification.result import Check
 from nichechain.verification.runs import Births, Ints, Run, differs
 

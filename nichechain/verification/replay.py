@@ -8,10 +8,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from nichechain.births import NONE, Offspring
+from nichechain.births.table import NONE, Offspring
+from nichechain.core.randomness import Purpose, keyed
 from nichechain.domains.base import Domain
-from nichechain.illumination import Elites
-from nichechain.randomness import Purpose, keyed
+from nichechain.search.elites import Elites
 from nichechain.variation import Mutation
 from nichechain.verification.result import GENOTYPES, Check
 from nichechain.verification.runs import Run, differs, largest_difference

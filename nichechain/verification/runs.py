@@ -9,10 +9,10 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from nichechain.births import NONE
-from nichechain.config import BuildConfig
+from nichechain.archive.read import Meta
+from nichechain.births.table import NONE
 from nichechain.domains.base import Evaluation
-from nichechain.store import Meta
+from nichechain.search.config import BuildConfig
 
 Ints = NDArray[np.int64]
 Floats = NDArray[np.float64]
@@ -21,7 +21,7 @@ Bools = NDArray[np.bool_]
 
 @dataclass(frozen=True)
 class Births:
-    """Columns of :mod:`nichechain.births`, ``NONE`` and NaN for null.
+    """Columns of :mod:`nichechain.births.table`, ``NONE`` and NaN for null.
 
     Parameters
     ----------

@@ -15,10 +15,11 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from nichechain.births import NONE, Offspring
+from nichechain.births.table import NONE, Offspring
 from nichechain.domains.base import Domain, Evaluation
-from nichechain.illumination import Elites, MapElites, SearchState
 from nichechain.niches import Niches
+from nichechain.search.elites import Elites, SearchState
+from nichechain.search.map_elites import MapElites
 from nichechain.verification.result import SEARCH, Check
 from nichechain.verification.runs import Births, Bools, Run, differs, largest_difference
 

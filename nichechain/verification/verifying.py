@@ -9,18 +9,18 @@ from pathlib import Path
 
 import numpy as np
 
-from nichechain import store
-from nichechain.archive import Archive, load
-from nichechain.arguments import check_seed, check_whole
-from nichechain.births import Offspring
+from nichechain.archive import read
+from nichechain.archive.archive import Archive, load
+from nichechain.births.table import Offspring
+from nichechain.core.checks import check_seed, check_whole
+from nichechain.core.errors import NichechainError
+from nichechain.core.machine import library_versions, machine
+from nichechain.core.randomness import Purpose, keyed
 from nichechain.domains.base import Domain, Evaluation
-from nichechain.errors import NichechainError
 from nichechain.execution import Executor, Threads
 from nichechain.execution.base import WORKER_DIED
-from nichechain.illumination import Elites
-from nichechain.niches import make as make_niches
-from nichechain.provenance import machine
-from nichechain.randomness import Purpose, keyed
+from nichechain.search.elites import Elites
+from nichechain.search.making import make_niches
 from nichechain.verification import record
 from nichechain.verification.evaluations import check_evaluations, evaluated
 from nichechain.verification.replay import Regrowth
@@ -111,9 +111,9 @@ def verify(
     )
 
 
-def _differences(meta: store.Meta) -> tuple[Difference, ...]:
+def _differences(meta: read.Meta) -> tuple[Difference, ...]:
     recorded = {**meta.versions, **meta.machine}
-    present = {**store.library_versions(), **machine()}
+    present = {**library_versions(), **machine()}
     return tuple(
         Difference(name, str(was), present[name])
         for name, was in recorded.items()
@@ -137,7 +137,7 @@ class _Work:
 
     def run(self) -> None:
         meta, niches = self.archive.meta, self.archive.niches
-        births = Births.of(store.read_births(self.archive.folder, meta))
+        births = Births.of(read.read_births(self.archive.folder, meta))
         self.checks += record.check_values(births, niches)
         runs = list(runs_of(meta))
         if not runs:
@@ -152,7 +152,7 @@ class _Work:
         if self.checks[-1].mismatches:
             self.unverified.append("everything else: it is not known which births are of which run")
             return
-        pending = store.read_state(self.archive.folder, meta).pending
+        pending = read.read_state(self.archive.folder, meta).pending
         elites = self.archive.elites
         self.checks += record.check_ancestry(births, runs)
         self.checks += record.check_elites(elites, births, niches)
@@ -254,7 +254,7 @@ class _Work:
 
 def _check_domain(archive: Archive, domain: Domain) -> Check:
     """Whether the domain is what the archive says of it."""
-    was, now = archive.meta.facts, store.DomainFacts.of(domain)
+    was, now = archive.meta.facts, read.DomainFacts.of(domain)
     agree = [getattr(was, name) == getattr(now, name) for name in was.__dataclass_fields__]
     agree.append(domain.seed == archive.config.domain_seed)
     apart = None

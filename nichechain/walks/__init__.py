@@ -5,7 +5,7 @@ How the next is chosen decides the evolutionary pressure: highly selective, adap
 
 from __future__ import annotations
 
-from nichechain.walks.advancing import Step, Walks
+from nichechain.walks.advance import Step, Walks
 from nichechain.walks.config import WalkConfig, run_seed
 from nichechain.walks.selection import (
     AtLeast,

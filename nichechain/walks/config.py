@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from nichechain.arguments import check_seed, check_whole
-from nichechain.diversity import ArchiveRule, KNearest, Metric
-from nichechain.errors import NichechainError
-from nichechain.randomness import Purpose, keyed
+from nichechain.core.checks import check_seed, check_whole
+from nichechain.core.errors import NichechainError
+from nichechain.core.randomness import Purpose, keyed
+from nichechain.walks.diversity import ArchiveRule, KNearest, Metric
 from nichechain.walks.selection import Selection, Selective
 
 

@@ -13,8 +13,8 @@ from typing import Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from nichechain.arguments import check_numbers
-from nichechain.errors import NichechainError
+from nichechain.core.checks import check_numbers
+from nichechain.core.errors import NichechainError
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -11,9 +11,9 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from nichechain import landscape
-from nichechain.births import NONE
-from nichechain.diversity import NoveltyArchive
-from nichechain.diversity.arrays import present
+from nichechain.births.table import NONE
+from nichechain.core.arrays import present
+from nichechain.walks.diversity import NoveltyArchive
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -9,14 +9,14 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import ArrayLike, NDArray
 
-from nichechain.arguments import as_floats, check_whole
+from nichechain.core.checks import as_floats, check_whole
+from nichechain.core.errors import NichechainError
+from nichechain.core.randomness import Purpose, keyed
 from nichechain.domains.base import Domain
-from nichechain.errors import NichechainError
 from nichechain.execution import Executor
 from nichechain.niches import Niches
-from nichechain.randomness import Purpose, keyed
 from nichechain.variation import Mutation
-from nichechain.walks.advancing import Walks, run_numbers
+from nichechain.walks.advance import Walks, run_numbers
 from nichechain.walks.config import WalkConfig, run_seed
 from nichechain.walks.state import StepRecord, WalkState, record_table
 

@@ -9,7 +9,7 @@ from nichechain.chain.base_measure import BaseMeasure
 from nichechain.chain.distance import DistanceDisplacement
 from nichechain.chain.empirical_bayes import _without_own
 from nichechain.chain.posterior import DirichletPosterior
-from nichechain.chain.wormholes import wormholes
+from nichechain.chain.structure.wormholes import wormholes
 from nichechain.niches import CVTNiches
 
 BOXES = {"line": ((0.0, 3.0),), "plane": ((0.0, 1.0), (0.0, 2.0)), "four": ((0.0, 1.0),) * 4}

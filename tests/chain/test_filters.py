@@ -6,7 +6,7 @@ import pyarrow as pa
 import pytest
 
 from nichechain import GridNiches, NichechainError, TransitionCounts
-from nichechain.births import schema
+from nichechain.births.table import schema
 from nichechain.chain.filters import counts_of
 
 GRID = GridNiches((2, 2), ((0.0, 1.0), (0.0, 1.0)))

@@ -11,9 +11,9 @@ from nichechain.chain import estimators
 from nichechain.chain import posterior as posteriors
 from nichechain.chain.base_measure import BaseMeasure
 from nichechain.chain.posterior import DirichletPosterior
-from nichechain.coverage import expected_coverage, sampled_coverage
-from nichechain.errors import NichechainError
-from nichechain.reach import visit_probability
+from nichechain.core.errors import NichechainError
+from nichechain.evolvability.coverage import expected_coverage, sampled_coverage
+from nichechain.evolvability.reach import visit_probability
 
 GRIDS = {"line": (7,), "plane": (4, 5), "space": (2, 3, 4)}
 OUTSIDE = ("state", "absorb", "clip")

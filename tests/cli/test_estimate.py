@@ -5,8 +5,8 @@ import pandas as pd
 import pytest
 
 import nichechain as nc
-from nichechain.chain.comparison import compare_estimators
 from nichechain.cli import main
+from nichechain.validation.held_out import compare_estimators
 
 
 def ask(capsys, *arguments):

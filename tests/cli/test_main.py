@@ -43,7 +43,7 @@ def test_unknown_command_is_one_sentence_and_status_2(capsys):
 
 
 def test_debug_shows_where_an_error_comes_from(tmp_path):
-    from nichechain.errors import ArchiveError
+    from nichechain.core.errors import ArchiveError
 
     assert main(["info", str(tmp_path)]) == 2
     with pytest.raises(ArchiveError):

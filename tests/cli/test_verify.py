@@ -10,10 +10,10 @@ from typing import Any
 
 import pytest
 
-from nichechain import store
+from nichechain.archive.read import checksum
 from nichechain.cli import console, verify
-from nichechain.committed import checksum
-from nichechain.errors import ArchiveError, NichechainError
+from nichechain.core.errors import ArchiveError, NichechainError
+from nichechain.core.machine import library_versions
 
 
 def resealed(folder: Path, **values: Any) -> None:
@@ -68,8 +68,8 @@ def test_a_mismatch_that_nothing_explains(other_seed: Path, capsys: pytest.Captu
 def test_a_mismatch_elsewhere_is_a_warning(
     other_seed: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    present = {**store.library_versions(), "numpy": "9.9"}
-    monkeypatch.setattr(store, "library_versions", lambda: present)
+    present = {**library_versions(), "numpy": "9.9"}
+    monkeypatch.setattr("nichechain.verification.verifying.library_versions", lambda: present)
     assert verify.run([str(other_seed), "--sample", "5"]) == 0
     shown = " ".join(capsys.readouterr().out.split())
     assert "likely cause: other version: numpy was" in shown

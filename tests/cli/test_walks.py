@@ -12,7 +12,7 @@ import pytest
 
 from nichechain.cli import main
 from nichechain.cli.walks import MetricName, Metrics, Mode, Pressure, Sensitivity
-from nichechain.experiments import (
+from nichechain.studies import (
     LEVELS,
     METRICS,
     VARIATIONS,
@@ -24,7 +24,7 @@ from nichechain.experiments import (
     read_study,
     variations,
 )
-from nichechain.experiments.report import FILES
+from nichechain.studies.report import FILES
 
 SMALL = ("--runs", "3", "--steps", "4", "--offspring", "6", "--workers", "1")
 

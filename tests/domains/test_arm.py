@@ -11,8 +11,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from nichechain.core.errors import NichechainError
 from nichechain.domains import Domain, PlanarArm
-from nichechain.errors import NichechainError
 from nichechain.execution import Threads
 
 angle = st.floats(-20, 20, width=32)

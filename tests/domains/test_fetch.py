@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from nichechain.core.errors import NichechainError
 from nichechain.domains import Domain, Evaluation, FetchPickAndPlace, make
-from nichechain.errors import NichechainError
 from nichechain.execution import Threads
 
 gymnasium.register_envs(gymnasium_robotics)

@@ -9,10 +9,10 @@ import pytest
 import torch
 from torch import nn
 
-from nichechain.controllers import MLP, ModuleController
+from nichechain.core.errors import NichechainError
 from nichechain.domains import FetchPickAndPlace
-from nichechain.engine.fetch import NativeFetch, SteppedFetch
-from nichechain.errors import NichechainError
+from nichechain.domains.engine.fetch import NativeFetch, SteppedFetch
+from nichechain.domains.policies.controllers import MLP, ModuleController
 
 
 class Residual(nn.Module):

@@ -7,7 +7,7 @@ import gymnasium_robotics
 import numpy as np
 import pytest
 
-from nichechain.controllers import MLP, ModuleController
+from nichechain.core.errors import NichechainError
 from nichechain.domains import (
     Domain,
     FetchPickAndPlace,
@@ -18,8 +18,8 @@ from nichechain.domains import (
     Perturbable,
     make,
 )
-from nichechain.engine.fetch import Disturbance, NativeFetch, SteppedFetch
-from nichechain.errors import NichechainError
+from nichechain.domains.engine.fetch import Disturbance, NativeFetch, SteppedFetch
+from nichechain.domains.policies.controllers import MLP, ModuleController
 
 gymnasium.register_envs(gymnasium_robotics)
 

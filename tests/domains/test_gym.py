@@ -14,9 +14,9 @@ from gymnasium import spaces
 
 import nichechain as nc
 from nichechain import execution
+from nichechain.core.errors import NichechainError
 from nichechain.domains import Domain, Evaluation, GymDomain, Noise, Noisy, Perturbable, make
-from nichechain.domains.spaces import BoxActions, DiscreteActions, Observations, actions_of
-from nichechain.errors import NichechainError
+from nichechain.domains.policies.spaces import BoxActions, DiscreteActions, Observations, actions_of
 
 SQUARE = ((-2.0, 2.0), (-2.0, 2.0))
 

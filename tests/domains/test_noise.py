@@ -12,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import nichechain as nc
+from nichechain.core.errors import NichechainError
 from nichechain.domains import (
     Domain,
     Evaluation,
@@ -24,7 +25,6 @@ from nichechain.domains import (
     noise_sensitivity,
 )
 from nichechain.domains.noise import average, evaluation_seeds
-from nichechain.errors import NichechainError
 from nichechain.execution import Threads
 
 

@@ -9,8 +9,9 @@ import pytest
 
 import nichechain as nc
 from nichechain import domains
+from nichechain.core.errors import NichechainError
 from nichechain.domains import Noisy, PlanarArm, WithSensitivity, registry
-from nichechain.errors import NichechainError
+from nichechain.search.making import make_domain
 
 OWN = ("arm", "cosinus", "fetch", "fetch-push", "fetch-reach", "fetch-slide", "linear")
 
@@ -115,4 +116,4 @@ def test_options_for_every_domain():
 
 def test_of_a_build():
     config = nc.BuildConfig("arm", (4, 4), ((-1, 1), (-1, 1)), domain_seed=3, domain_options={"joints": 6})
-    assert repr(domains.of(config)) == "PlanarArm(joints=6, seed=3)"
+    assert repr(make_domain(config)) == "PlanarArm(joints=6, seed=3)"

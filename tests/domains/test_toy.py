@@ -7,10 +7,10 @@ import math
 import numpy as np
 import pytest
 
+from nichechain.core.errors import NichechainError
 from nichechain.domains import CosinusMap, Domain, LinearMap, Noise, Perturbable, make
-from nichechain.errors import NichechainError
-from nichechain.polynomial import PolynomialMutation
-from nichechain.visits import uniformity
+from nichechain.evolvability.visits import uniformity
+from nichechain.variation.polynomial import PolynomialMutation
 
 MAPS = [CosinusMap, LinearMap]
 mutate = PolynomialMutation(-5.0, 5.0, eta=45.0)

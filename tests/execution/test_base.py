@@ -11,8 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import ArrayLike
 
+from nichechain.core.errors import NichechainError
 from nichechain.domains import Evaluation, PlanarArm
-from nichechain.errors import NichechainError
 from nichechain.execution import evaluate_rows
 from nichechain.execution.base import reason_of
 

@@ -9,7 +9,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 import numpy as np
 import pytest
 
-from nichechain.errors import NichechainError
+from nichechain.core.errors import NichechainError
 from nichechain.execution import fleet
 from nichechain.execution.fleet import Fleet, Outcome, Workbench, Worker
 

@@ -7,7 +7,7 @@ import sys
 import pytest
 
 from nichechain import execution
-from nichechain.errors import NichechainError
+from nichechain.core.errors import NichechainError
 from nichechain.execution import Processes, Threads, available_cpus
 
 

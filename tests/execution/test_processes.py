@@ -13,11 +13,11 @@ import pytest
 
 import nichechain
 from nichechain import variation
-from nichechain.building import build
-from nichechain.config import BuildConfig
+from nichechain.archive.build import build
+from nichechain.core.errors import NichechainError
 from nichechain.domains import FetchPickAndPlace
-from nichechain.errors import NichechainError
 from nichechain.execution import Executor, Processes, Threads, evaluate_rows
+from nichechain.search.config import BuildConfig
 from nichechain.walks import Selective, WalkConfig, walk
 
 from .samples import (
@@ -81,7 +81,7 @@ def test_a_build_leaves_the_same_bytes(two: Processes, tmp_path: Path) -> None:
 
 
 def test_a_walk_takes_the_same_steps(two: Processes) -> None:
-    config = WalkConfig(Selective(), nichechain.diversity.make("knn"), offspring=6, seed=3)
+    config = WalkConfig(Selective(), nichechain.walks.diversity.make("knn"), offspring=6, seed=3)
     arm = Arm()
     there = walk(arm, variation.cauchy(), config, runs=3, steps=4, executor=two)
     here = walk(arm, variation.cauchy(), config, runs=3, steps=4)

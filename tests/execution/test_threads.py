@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from numpy.typing import ArrayLike
 
+from nichechain.core.errors import NichechainError
 from nichechain.domains import Evaluation, PlanarArm
-from nichechain.errors import NichechainError
 from nichechain.execution import Threads, available_cpus
 
 

@@ -6,11 +6,11 @@ from collections.abc import Callable
 
 import pytest
 
-from nichechain import diversity, variation
+from nichechain import variation
 from nichechain.domains import PlanarArm
 from nichechain.execution import Executor, Processes, Threads
 from nichechain.niches import GridNiches
-from nichechain.walks import TopFraction, WalkConfig, WalkResult, walk
+from nichechain.walks import TopFraction, WalkConfig, WalkResult, diversity, walk
 
 from .samples import Arm
 

@@ -10,12 +10,13 @@ import pytest
 from matplotlib.figure import Figure
 
 import nichechain as nc
-from nichechain import domains, experiments, store, validation, variation
+from nichechain import domains, studies, validation, variation
+from nichechain.archive import read
 from nichechain.chain.counts import TransitionCounts
-from nichechain.controllers import MLP
+from nichechain.domains.policies.controllers import MLP
+from nichechain.evolvability.reach import reach
 from nichechain.landscape import measure_archive
 from nichechain.niches import CVTNiches, GridNiches
-from nichechain.reach import reach
 from nichechain.walks import WalkConfig
 
 
@@ -62,11 +63,11 @@ def world(tmp_path_factory: pytest.TempPathFactory) -> SimpleNamespace:
         with nc.Threads(1) as threads:
             nc.build(other, folder / name, threads)
     (folder / "log.csv").write_text("parent_niche,child_niche\n0,1\n1,2\n")
-    study = experiments.Study(
-        "pressure", "arm", (experiments.Condition("a", offspring=2),), 1, 0, (2, 2), ((0, 1), (0, 1))
+    study = studies.Study(
+        "pressure", "arm", (studies.Condition("a", offspring=2),), 1, 0, (2, 2), ((0, 1), (0, 1))
     )
     here = _Here()
-    experiments.run(study, folder / "study", here)
+    studies.run(study, folder / "study", here)
     chain = archive.chain()
     filled = archive.elites.niche[archive.elites.niche < len(archive.niches)]
     lineages = validation.run_lineages(archive, filled[:4], here, l=2, lineages=3, offspring=2)
@@ -74,7 +75,7 @@ def world(tmp_path_factory: pytest.TempPathFactory) -> SimpleNamespace:
     walk = WalkConfig(offspring=3)
     return SimpleNamespace(
         axes=lambda: Figure().subplots(),
-        records=experiments.read_records(folder / "study").to_pandas(),
+        records=studies.read_records(folder / "study").to_pandas(),
         archive_scores=nc.niche_evolvability(chain, l=1, lineages=2, draws=2),
         reached=reach(chain, niche=0, l=1, draws=2),
         check=validation.compare(chain, lineages, archive.niches, draws=2),
@@ -106,7 +107,7 @@ def world(tmp_path_factory: pytest.TempPathFactory) -> SimpleNamespace:
         archive=archive,
         elite=archive.elite(archive.niches.index(int(archive.elites.niche[0]))),
         births=archive.births(),
-        table=store.read_births(archive.folder, archive.meta),
+        table=read.read_births(archive.folder, archive.meta),
         counts=counts,
         estimated=nc.estimate(counts),
         given=given,

@@ -117,43 +117,43 @@ CALLS = (
         lambda w: {"counts": w.counts, "estimator": "dirichlet"},
         {"unvisited": ("base",), "strength": (0.0, -1.0, np.nan, "three", [1.0])},
     ),
-    _at("chain.analysis.communicating_classes", threshold=_THRESHOLD),
-    _at("chain.analysis.recurrent_classes", threshold=_THRESHOLD),
-    _at("chain.analysis.betweenness", threshold=SHARE),
-    _at("chain.graph.reachability_graph", threshold=SHARE),
+    _at("chain.structure.classes.communicating_classes", threshold=_THRESHOLD),
+    _at("chain.structure.classes.recurrent_classes", threshold=_THRESHOLD),
+    _at("chain.structure.classes.betweenness", threshold=SHARE),
+    _at("chain.structure.graph.reachability_graph", threshold=SHARE),
     Call(
-        "chain.passage.hitting_probabilities",
+        "chain.structure.passage.hitting_probabilities",
         lambda w: {"chain": w.estimated, "target": 0},
         {"target": (*_NOWHERE, [], [0, 99], None)},
     ),
     Call(
-        "chain.passage.mean_first_passage_times",
+        "chain.structure.passage.mean_first_passage_times",
         lambda w: {"chain": w.estimated, "target": 0},
         {"target": (*_NOWHERE, [], [0, 99], None)},
     ),
     Call(
-        "chain.passage.quasi_stationary_distribution",
+        "chain.structure.passage.quasi_stationary_distribution",
         lambda w: {"chain": w.estimated, "states": [0, 1]},
         {"states": (*_NOWHERE, [], [0, 99])},
     ),
     _at(
-        "chain.sampling.where_to_sample",
+        "evolvability.where_to_sample.where_to_sample",
         chain=(_NO_POSTERIOR,),
         births=whole(0),
         draws=whole(1),
         **_ROOT,
     ),
     _at(
-        "chain.sampling.evolvability_derivative",
+        "evolvability.where_to_sample.evolvability_derivative",
         **{name: values for name, values in _ROOT.items() if name != "seed"},
     ),
     Call(
-        "chain.comparison.compare_estimators",
+        "validation.held_out.compare_estimators",
         lambda w: {"counts": w.counts},
         {"folds": (*whole(1), 10_000), "seed": SEED},
     ),
     Call(
-        "chain.contrast.contrast",
+        "validation.contrast.contrast",
         lambda w: {"first": w.table, "second": w.table, "niches": w.archive.niches, "resamples": 2},
         {
             "first": (Made(lambda w: w.table.slice(0, 0), "no-births"),),
@@ -166,7 +166,7 @@ CALLS = (
         },
     ),
     Call(
-        "chain.stability.rank_stability",
+        "validation.stability.rank_stability",
         lambda w: {"counts": w.counts, "fractions": (0.5,), "repeats": 1, "draws": 1},
         {
             "fractions": ((), (0.0,), (1.0,), (-0.5,), (np.nan,), ("half",)),
@@ -179,7 +179,7 @@ CALLS = (
         },
     ),
     _at(
-        "chain.wormholes.wormholes",
+        "chain.structure.wormholes.wormholes",
         chain=(_NO_POSTERIOR,),
         beyond=UNKNOWN,
         times=(0.9, -1.0, np.inf, *NOT_A_NUMBER),
@@ -196,24 +196,32 @@ CALLS = (
         },
     ),
     Call(
-        "reach.reach",
+        "evolvability.reach.reach",
         lambda w: {"chain": w.estimated, "niche": 0},
         {"offspring": ([1.0],), "draws": whole(0), **_ROOT},
     ),
     Call(
-        "reach.reach",
+        "evolvability.reach.reach",
         lambda w: {"chain": w.estimated},
         {"niche": (None,), "offspring": _SHARES},
     ),
     Call(
-        "visits.visit_metrics",
+        "evolvability.visits.visit_metrics",
         lambda w: {"chain": w.estimated, "niche": 0},
         {"offspring": ([1.0],), "repeats": whole(0), "draws": whole(0), **_ROOT},
     ),
-    Call("visits.uniformity", lambda w: {"visits": [1, 2]}, {"visits": (*RAGGED, [1, -1], 3.0, [])}),
-    Call("visits.visit_entropy", lambda w: {"visits": [1, 2]}, {"visits": (*RAGGED, [1, -1], 3.0, [])}),
     Call(
-        "coverage.expected_coverage",
+        "evolvability.visits.uniformity",
+        lambda w: {"visits": [1, 2]},
+        {"visits": (*RAGGED, [1, -1], 3.0, [])},
+    ),
+    Call(
+        "evolvability.visits.visit_entropy",
+        lambda w: {"visits": [1, 2]},
+        {"visits": (*RAGGED, [1, -1], 3.0, [])},
+    ),
+    Call(
+        "evolvability.coverage.expected_coverage",
         lambda w: {"transition": w.given.T, "first": w.given.T, "generations": 2, "lineages": 3},
         {
             "generations": whole(0),
@@ -224,7 +232,7 @@ CALLS = (
     ),
     *(
         Call(
-            f"coverage.{name}",
+            f"evolvability.coverage.{name}",
             lambda w: {
                 "transition": w.given.T,
                 "roots": [0, 1],
@@ -242,7 +250,7 @@ CALLS = (
         for name in ("coverage_by_generation",)
     ),
     Call(
-        "coverage.sampled_coverage",
+        "evolvability.coverage.sampled_coverage",
         lambda w: {
             "transition": w.given.T,
             "first": np.array([1.0, 0.0, 0.0]),
@@ -254,7 +262,7 @@ CALLS = (
         {"generations": whole(0), "lineages": whole(0), "repeats": whole(0), "counted": (-1, 4, 1.5)},
     ),
     Call(
-        "coverage.rarefied_coverage",
+        "evolvability.coverage.rarefied_coverage",
         lambda w: {"counts": [1, 2, 3], "size": 2},
         {
             "counts": ([0, 0], *RAGGED, [1, -1, 3], [0.5, 3.0]),

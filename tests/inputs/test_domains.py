@@ -163,7 +163,11 @@ CALLS = (
         },
     ),
     *(
-        Call(f"domains.{name}", lambda w: {}, {"seed": SEED, "controller": ("lstm", "mlp:x", "mlp:0")})
+        Call(
+            f"domains.{name}",
+            lambda w: {},
+            {"seed": SEED, "controller": ("lstm", "mlp:x", "mlp:0"), "cache_memory": whole(-1)},
+        )
         for name in ("FetchPickAndPlace", "FetchPush", "FetchReach", "FetchSlide")
     ),
     Call("domains.Noise", lambda w: {}, {"observation": _NOISE, "action": _NOISE, "initial": _NOISE}),
@@ -222,7 +226,7 @@ CALLS = (
         {"step_sizes": ((0.0,), (-1.0,), (np.nan,), ("three",), ())},
     ),
     Call(
-        "polynomial.PolynomialMutation",
+        "variation.polynomial.PolynomialMutation",
         lambda w: {"low": 0.0, "high": 1.0},
         {
             "low": (1.0, 2.0, *NOT_A_NUMBER),
@@ -231,7 +235,7 @@ CALLS = (
         },
     ),
     Call(
-        "controllers.MLP",
+        "domains.policies.controllers.MLP",
         lambda w: {"sizes": (3, 4, 2)},
         {
             "sizes": ((3,), (3, 0, 2), (3, -1, 2), (), (3, 1.5, 2), ("a", 2)),
@@ -240,7 +244,7 @@ CALLS = (
         },
     ),
     Call(
-        "controllers.MLP.actions",
+        "domains.policies.controllers.MLP.actions",
         lambda w: {"self": w.mlp, "genotype": np.zeros(20), "observations": np.zeros((1, 3))},
         {
             "genotype": (np.zeros(3), np.zeros((1, 20)), *RAGGED),
@@ -248,10 +252,12 @@ CALLS = (
         },
     ),
     Call(
-        "controllers.MLP.sample", lambda w: {"self": w.mlp, "n": 1, "seed": 0}, {"n": whole(-1), "seed": SEED}
+        "domains.policies.controllers.MLP.sample",
+        lambda w: {"self": w.mlp, "n": 1, "seed": 0},
+        {"n": whole(-1), "seed": SEED},
     ),
     Call(
-        "controllers.MLP.module",
+        "domains.policies.controllers.MLP.module",
         lambda w: {"self": w.mlp, "genotype": np.zeros(20)},
         {"genotype": (np.zeros(3),)},
     ),

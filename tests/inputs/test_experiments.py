@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from nichechain.experiments import Condition
+from nichechain.studies import Condition
 
 from .table import (
     NOT_A_NUMBER,
@@ -42,7 +42,7 @@ _TEST = {"permutations": whole(0), "seed": SEED}
 
 CALLS = (
     Call(
-        "experiments.Condition",
+        "studies.Condition",
         lambda w: {"label": "a"},
         {
             "label": ("", "--"),
@@ -60,12 +60,12 @@ CALLS = (
         },
     ),
     Call(
-        "experiments.Condition",
+        "studies.Condition",
         lambda w: {"label": "a", "metric": "kde"},
         {"bandwidth": POSITIVE, "decay": (0.0, 1.1, *NOT_A_NUMBER)},
     ),
     Call(
-        "experiments.Study",
+        "studies.Study",
         lambda w: {
             "kind": "pressure",
             "domain": "arm",
@@ -86,22 +86,22 @@ CALLS = (
             "bounds": (((0, 1),), ((1, 0), (0, 1)), "0,1"),
         },
     ),
-    Call("experiments.pressure_of", lambda w: {"level": "0.5"}, {"level": ("better", "2", *UNKNOWN)}),
-    Call("experiments.selection_of", lambda w: {"level": "0.5"}, {"level": ("0", "2", *UNKNOWN)}),
-    Call("experiments.condition_seed", lambda w: {"seed": 0, "label": "a"}, {"seed": SEED}),
+    Call("studies.pressure_of", lambda w: {"level": "0.5"}, {"level": ("better", "2", *UNKNOWN)}),
+    Call("studies.selection_of", lambda w: {"level": "0.5"}, {"level": ("0", "2", *UNKNOWN)}),
+    Call("studies.condition_seed", lambda w: {"seed": 0, "label": "a"}, {"seed": SEED}),
     Call(
-        "experiments.pressure_conditions",
+        "studies.pressure_conditions",
         lambda w: {"levels": ("0.5",), "base": _LABEL},
         {"levels": (("2",), ("no-such-thing",))},
     ),
     Call(
-        "experiments.metric_conditions",
+        "studies.metric_conditions",
         lambda w: {"metrics": ("knn",), "base": _LABEL},
         {"metrics": (("no-such-thing",),)},
     ),
-    Call("experiments.variations", lambda w: {"name": "k", "base": _LABEL}, {"name": UNKNOWN}),
+    Call("studies.variations", lambda w: {"name": "k", "base": _LABEL}, {"name": UNKNOWN}),
     Call(
-        "experiments.initialise",
+        "studies.initialise",
         lambda w: {"domain": w.arm, "scheme": "normal:0.1", "n": 2, "seed": 0},
         {
             "scheme": (*UNKNOWN, "normal:-1", "orthogonal", "elites:/no/such/folder"),
@@ -109,31 +109,31 @@ CALLS = (
             "seed": SEED,
         },
     ),
-    Call("experiments.read_study", lambda w: {"folder": w.study}, {"folder": ("/no/such/folder",)}),
-    Call("experiments.read_records", lambda w: {"folder": w.study}, {"folder": ("/no/such/folder",)}),
-    Call("experiments.read_births", lambda w: {"folder": w.study}, {"folder": ("/no/such/folder",)}),
+    Call("studies.read_study", lambda w: {"folder": w.study}, {"folder": ("/no/such/folder",)}),
+    Call("studies.read_records", lambda w: {"folder": w.study}, {"folder": ("/no/such/folder",)}),
+    Call("studies.read_births", lambda w: {"folder": w.study}, {"folder": ("/no/such/folder",)}),
     Call(
-        "experiments.statistics.pressure_test",
+        "studies.statistics.pressure_test",
         lambda w: {"pressure": [0, 0, 1, 1], "values": [1, 2, 3, 4], "resamples": 20},
         {"pressure": (*_RUNS, [1, 1, 1, 1]), "values": (*_RUNS, [1, 1, 1, 1]), **_BOOTSTRAP},
     ),
     Call(
-        "experiments.statistics.metric_test",
+        "studies.statistics.metric_test",
         lambda w: {"groups": _GROUPS, "resamples": 20},
         {"groups": _BAD_GROUPS, **_BOOTSTRAP},
     ),
     Call(
-        "experiments.statistics.paired_test",
+        "studies.statistics.paired_test",
         lambda w: {"groups": _GROUPS, "resamples": 20},
         {"groups": (*_BAD_GROUPS, {"a": [1.0, 2.0], "b": [1.0, 2.0, 3.0]}), **_BOOTSTRAP},
     ),
     Call(
-        "experiments.statistics.change_test",
+        "studies.statistics.change_test",
         lambda w: {"before": [1.0, 2.0, 3.0], "after": [1.0, 4.0, 9.0]},
         {"before": (*_RUNS, [1.0, 4.0, 9.0]), "after": (*_RUNS, [1.0, 2.0, 3.0])},
     ),
     Call(
-        "experiments.statistics.signed_rank_test",
+        "studies.statistics.signed_rank_test",
         lambda w: {"values": [1.0, 2.0, -3.0], "name": "r", "resamples": 20},
         {"values": (*_RUNS, [0.0, 0.0]), **_BOOTSTRAP},
     ),

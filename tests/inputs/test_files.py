@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from nichechain.importing import Axes, Columns
+from nichechain.archive.imported import Axes, Columns
 
 from .table import (
     LINEAGES,
@@ -89,7 +89,7 @@ CALLS = (
         },
     ),
     Call(
-        "niches.check",
+        "search.making.check_niches",
         lambda w: {"config": w.config},
         {
             "config": _configs(
@@ -103,7 +103,7 @@ CALLS = (
         },
     ),
     Call(
-        "variation.configured",
+        "search.making.make_mutation",
         lambda w: {"config": w.config, "domain": w.arm},
         {
             "config": _configs(
@@ -131,7 +131,7 @@ CALLS = (
         },
     ),
     Call(
-        "merging.merge",
+        "archive.merge.merge",
         lambda w: {"folders": (w.archive.folder, w.again), "out": w.fresh()},
         {
             "folders": (
@@ -145,7 +145,7 @@ CALLS = (
         },
     ),
     Call(
-        "importing.import_births",
+        "archive.imported.import_births",
         lambda w: {"log": w.log, "folder": w.fresh(), "niches": w.niches},
         {
             "log": (
@@ -167,14 +167,14 @@ CALLS = (
     ),
     *(
         Call(
-            f"exports.{name}",
+            f"archive.exports.{name}",
             lambda w: {"graph": w.archive.chain().graph(0.1), "path": w.folder / "graph"},
             {"path": (_GONE,)},
         )
         for name in ("write_graphml", "write_gexf", "write_dot", "write_edges")
     ),
     Call(
-        "exports.write_stn",
+        "archive.exports.write_stn",
         lambda w: {"births": w.births, "niches": w.archive.niches, "path": w.folder / "stn.csv"},
         {
             "births": (_without("run"), _without("objective")),
@@ -183,7 +183,7 @@ CALLS = (
         },
     ),
     Call(
-        "exports.write_phylogeny",
+        "archive.exports.write_phylogeny",
         lambda w: {"births": w.births, "niches": w.archive.niches, "path": w.folder / "tree.csv"},
         {
             "births": (_without("uid"), _ORPHAN),
@@ -191,14 +191,14 @@ CALLS = (
             "path": (_GONE,),
         },
     ),
-    Call("exports.genealogy", lambda w: {"births": w.births}, {"births": (_without("uid"), _ORPHAN)}),
+    Call("archive.exports.genealogy", lambda w: {"births": w.births}, {"births": (_without("uid"), _ORPHAN)}),
     Call(
-        "exports.write_genealogy",
+        "archive.exports.write_genealogy",
         lambda w: {"births": w.births, "path": w.folder / "pairs.csv"},
         {"births": (_without("parent_uid"), _ORPHAN), "path": (_GONE,)},
     ),
     Call(
-        "selection.curiosity",
+        "search.parents.curiosity",
         lambda w: {"births": w.births},
         {
             "births": (
@@ -209,7 +209,7 @@ CALLS = (
         },
     ),
     Call(
-        "sweep.sweep",
+        "validation.grid_size.sweep",
         lambda w: {"archive": w.archive, "sizes": (2,), "draws": 1},
         {
             "sizes": ((), (0,), (-1,), (2.5,), ("a",), ((2,),), (10**6,)),
@@ -228,11 +228,14 @@ CALLS = (
     Call(
         "execution.make",
         lambda w: {"workers": "1"},
-        {"workers": ("0", "-1", "threads:0", "threads:x", "processes:-1", "dask", "1.5", "ray:x", "three")},
+        {
+            "workers": ("0", "-1", "threads:0", "threads:x", "processes:-1", "dask", "1.5", "ray:x", "three"),
+            "cache_memory": ("-1", "two", "2TB", "1.5.2GB", ""),
+        },
     ),
-    Call("execution.Threads", lambda w: {"workers": 1}, {"workers": whole(0)}),
+    Call("execution.Threads", lambda w: {"workers": 1}, {"workers": whole(0), "cache_memory": whole(-1)}),
     Call("Threads", lambda w: {"workers": 1}, {"workers": (0,)}),
-    Call("execution.Processes", lambda w: {"workers": 1}, {"workers": whole(0)}),
+    Call("execution.Processes", lambda w: {"workers": 1}, {"workers": whole(0), "cache_memory": whole(-1)}),
     Call(
         "pyribs.record",
         lambda w: {"scheduler": w.scheduler()},
@@ -251,7 +254,7 @@ CALLS = (
             "seed": SEED,
         },
     ),
-    Call("failures.Failures", lambda w: {}, {"most": (-0.1, 1.1, *NOT_A_NUMBER)}),
+    Call("search.failures.Failures", lambda w: {}, {"most": (-0.1, 1.1, *NOT_A_NUMBER)}),
 )
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from nichechain.diversity import ArchiveRule
+from nichechain.walks.diversity import ArchiveRule
 
 from .table import (
     NOT_A_NUMBER,
@@ -66,10 +66,10 @@ CALLS = (
     Call(
         "walks.WalkResult.series", lambda w: {"self": w.walked, "measure": "coverage"}, {"measure": UNKNOWN}
     ),
-    Call("diversity.make", lambda w: {"name": "knn"}, {"name": UNKNOWN}),
-    Call("diversity.KNearest", lambda w: {}, {"k": whole(0)}),
+    Call("walks.diversity.make", lambda w: {"name": "knn"}, {"name": UNKNOWN}),
+    Call("walks.diversity.KNearest", lambda w: {}, {"k": whole(0)}),
     Call(
-        "diversity.KernelDensity",
+        "walks.diversity.KernelDensity",
         lambda w: {},
         {
             "bandwidth": (*POSITIVE, ((1.0, 0.0), (0.0, 1.0))),
@@ -78,7 +78,7 @@ CALLS = (
         },
     ),
     Call(
-        "diversity.KernelDensity",
+        "walks.diversity.KernelDensity",
         lambda w: {"mode": "matrix", "bandwidth": ((1.0, 0.0), (0.0, 1.0))},
         {
             "bandwidth": (
@@ -92,7 +92,7 @@ CALLS = (
         },
     ),
     Call(
-        "diversity.ArchiveRule",
+        "walks.diversity.ArchiveRule",
         lambda w: {},
         {
             "limit": whole(0),
@@ -102,9 +102,9 @@ CALLS = (
             "scope": UNKNOWN,
         },
     ),
-    Call("diversity.ArchiveRule", lambda w: {"count": 3}, {"probability": (0.5,)}),
+    Call("walks.diversity.ArchiveRule", lambda w: {"count": 3}, {"probability": (0.5,)}),
     Call(
-        "diversity.knn_distance",
+        "walks.diversity.knn_distance",
         lambda w: {"query": _points(), "pool": _points(2, 5, 2), "k": 2},
         {
             "query": _POINTS,
@@ -114,7 +114,7 @@ CALLS = (
         },
     ),
     Call(
-        "diversity.kernel_density",
+        "walks.diversity.kernel_density",
         lambda w: {"query": _points(), "pool": _points(2, 5, 2), "matrix": np.eye(2)},
         {
             "query": _POINTS,
@@ -125,12 +125,12 @@ CALLS = (
         },
     ),
     Call(
-        "diversity.parent_distance",
+        "walks.diversity.parent_distance",
         lambda w: {"query": _points(), "parent": _points()},
         {"query": (np.zeros((2, 3)), *RAGGED), "parent": (np.zeros((2, 3)), *RAGGED)},
     ),
     Call(
-        "diversity.ancestor_distance",
+        "walks.diversity.ancestor_distance",
         lambda w: {"query": _points(), "path": _points(2, 1, 4, 2), "lineage": [0, 0, 0]},
         {
             "query": (np.zeros((2, 3)), *RAGGED),

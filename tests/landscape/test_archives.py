@@ -11,10 +11,10 @@ import pytest
 from scipy import stats
 
 from nichechain import NichechainError, build, landscape, load, variation
-from nichechain.config import BuildConfig
 from nichechain.domains import Noise, Noisy, PlanarArm
 from nichechain.execution import Threads
 from nichechain.landscape import MEASURES, measure_archive, sampling
+from nichechain.search.config import BuildConfig
 
 ARM = BuildConfig(
     "arm", (6, 5), ((-0.7, 1.0), (-0.9, 0.8)), evaluations=400, initial=50, batch=32, scale=0.2, seed=2

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from nichechain import NichechainError, landscape
-from nichechain.births import NONE
+from nichechain.births.table import NONE
 
 PARENT = np.array([0.0, 0.0])
 SQUARE = np.array([[1.0, 1.0], [1.0, -1.0], [-1.0, 1.0], [-1.0, -1.0]])

@@ -8,9 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from nichechain import NichechainError, domains, landscape, variation
+from nichechain.core.randomness import Purpose, keyed
 from nichechain.execution import Threads
 from nichechain.niches import GridNiches
-from nichechain.randomness import Purpose, keyed
 
 
 def test_measures_of_a_genotype_are_those_of_its_children():

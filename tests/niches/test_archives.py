@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 import nichechain as nc
-from nichechain import store
+from nichechain.archive import write
+from nichechain.archive.exports import write_stn
+from nichechain.archive.imported import Columns, import_births
+from nichechain.archive.merge import merge
 from nichechain.cli import main
-from nichechain.errors import ArchiveError, NichechainError
-from nichechain.exports import write_stn
-from nichechain.importing import Columns, import_births
-from nichechain.merging import merge
+from nichechain.core.errors import ArchiveError, NichechainError
 from nichechain.niches import CVTNiches
 
 from .spaces import build, config
@@ -169,7 +169,7 @@ def _forge(source: Path, folder: Path, content: bytes | None) -> None:
 
 def test_clearing_removes_centroids(tmp_path):
     build(tmp_path, replace(KINDS["cvt"], evaluations=120))
-    store.clear(tmp_path)
+    write.clear(tmp_path)
     assert not _content(tmp_path)
 
 

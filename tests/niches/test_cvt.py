@@ -8,7 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from nichechain import BuildConfig, GridNiches, NichechainError
-from nichechain.niches import CVTNiches, Niches, check, make, parse_niches
+from nichechain.niches import CVTNiches, Niches, parse_niches
+from nichechain.search.making import check_niches, make_niches
 
 BOXES = {
     "line": ((-0.1, 0.2),),
@@ -164,15 +165,15 @@ def test_of_agrees_with_pyribs_for_any_number_and_axes(number, axes, seed):
 
 def test_what_a_configuration_says_makes_the_niches_again():
     config = BuildConfig("arm", (30,), UNIT, niches="cvt", niches_seed=5, outside="absorb")
-    made = make(config)
+    made = make_niches(config)
     assert made == CVTNiches.tessellated(30, UNIT, seed=5, outside="absorb")
     assert made.settings() == {"niches": "cvt", "shape": (30,), "bounds": UNIT, "outside": "absorb"}
-    kept = make(config, made.centers[::-1])
+    kept = make_niches(config, made.centers[::-1])
     np.testing.assert_array_equal(kept.centers, made.centers[::-1])
     with pytest.raises(NichechainError, match="there are 29 centroids, but must be 30"):
-        make(config, made.centers[1:])
+        make_niches(config, made.centers[1:])
     grid = GridNiches((3, 4), UNIT, "clip")
-    assert make(BuildConfig("arm", **grid.settings())) == grid
+    assert make_niches(BuildConfig("arm", **grid.settings())) == grid
 
 
 @pytest.mark.parametrize(
@@ -186,7 +187,7 @@ def test_what_a_configuration_says_makes_the_niches_again():
 def test_a_configuration_is_checked_without_a_tessellation(kind, values, message):
     shape = (3, 3) if kind == "grid" else (10**9,)
     with pytest.raises(NichechainError, match=message):
-        check(BuildConfig("arm", **{"shape": shape, "bounds": UNIT, "niches": kind, **values}))
+        check_niches(BuildConfig("arm", **{"shape": shape, "bounds": UNIT, "niches": kind, **values}))
 
 
 @pytest.mark.parametrize("text", ["400", "cvt", "cvt:", "cvt:0", "cvt:-3", "cvt:2.5", "grid:20x20", "CVT:4"])

@@ -7,11 +7,11 @@ from matplotlib.path import Path as Outline
 
 import nichechain as nc
 from nichechain import plots
-from nichechain.chain.wormholes import wormholes
-from nichechain.errors import NichechainError
+from nichechain.chain.structure.wormholes import wormholes
+from nichechain.core.errors import NichechainError
+from nichechain.evolvability.reach import reach
 from nichechain.niches import CVTNiches, GridNiches
 from nichechain.plots.cells import borders, cells_along, fill, frame, hatch, voronoi_cells
-from nichechain.reach import reach
 
 from ..niches.spaces import build, config  # noqa: TID252  # tests are no installed package
 

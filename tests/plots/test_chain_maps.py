@@ -8,14 +8,14 @@ from matplotlib.figure import Figure
 from scipy.sparse.csgraph import connected_components
 
 import nichechain as nc
-from nichechain.chain.wormholes import wormholes
-from nichechain.errors import NichechainError
+from nichechain.chain.structure.wormholes import wormholes
+from nichechain.core.errors import NichechainError
+from nichechain.evolvability.reach import reach
 from nichechain.plots.classes import plot_classes, plot_transitions_by_class
 from nichechain.plots.reach import plot_reach
 from nichechain.plots.style import LONG_JUMP
 from nichechain.plots.uncertainty import plot_uncertainty
 from nichechain.plots.wormholes import plot_wormholes
-from nichechain.reach import reach
 
 
 @pytest.fixture(scope="module")

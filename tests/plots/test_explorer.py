@@ -9,7 +9,7 @@ import pytest
 
 import nichechain as nc
 from nichechain.chain.counts import TransitionCounts
-from nichechain.errors import NichechainError
+from nichechain.core.errors import NichechainError
 from nichechain.niches import GridNiches
 from nichechain.plots.explorer import CompactTransition, explorer_page, write_explorer
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import nichechain as nc
-from nichechain.coverage import expected_coverage, visit_probabilities
+from nichechain.evolvability.coverage import expected_coverage, visit_probabilities
 from nichechain.plots.explorer import CompactTransition, write_explorer
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")

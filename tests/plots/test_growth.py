@@ -4,8 +4,8 @@ from matplotlib.figure import Figure
 from scipy import sparse
 
 import nichechain as nc
-from nichechain.coverage import coverage_by_generation, expected_coverage
-from nichechain.errors import NichechainError
+from nichechain.core.errors import NichechainError
+from nichechain.evolvability.coverage import coverage_by_generation, expected_coverage
 from nichechain.plots.growth import plot_generations, plot_lineages
 
 

@@ -4,7 +4,7 @@ from matplotlib.figure import Figure
 
 import nichechain as nc
 from nichechain import plots
-from nichechain.errors import NichechainError
+from nichechain.core.errors import NichechainError
 from nichechain.plots.style import FAINT, LONG_JUMP, behavior_axes
 
 

@@ -1,8 +1,8 @@
 import numpy as np
 from matplotlib.figure import Figure
 
-from nichechain.chain.stability import ENOUGH, RankStability
 from nichechain.plots.stability import plot_stability
+from nichechain.validation.stability import ENOUGH, RankStability
 
 
 def test_shows_the_curve_the_halves_and_what_is_enough():

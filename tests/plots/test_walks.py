@@ -5,7 +5,7 @@ from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from scipy import stats
 
-from nichechain.errors import NichechainError
+from nichechain.core.errors import NichechainError
 from nichechain.plots.walks import MEASURES, draw_study, line_styles, plot_runs, plot_walks
 
 LABELS = ("selective", "0.5", "random")

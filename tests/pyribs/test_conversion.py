@@ -10,12 +10,12 @@ from ribs.emitters import GaussianEmitter, IsoLineEmitter
 
 import nichechain as nc
 from nichechain import ArchiveError, NichechainError
+from nichechain.archive.imported import Axes
 from nichechain.cli import main
 from nichechain.domains import PlanarArm
-from nichechain.importing import Axes
 from nichechain.niches import CVTNiches, GridNiches
 from nichechain.pyribs import from_ribs, record, to_ribs
-from nichechain.selection import curiosity
+from nichechain.search.parents import curiosity
 
 from .searches import RANGES, cvt, grid, run, search
 
@@ -180,7 +180,7 @@ def test_what_cannot_be_converted_is_named(made, tmp_path):
         from_ribs([], tmp_path / "c")
     log = tmp_path / "log.csv"
     log.write_text("parent_niche,child_niche\n,1\n1,2\n")
-    from nichechain.importing import import_births
+    from nichechain.archive.imported import import_births
 
     import_births(log, tmp_path / "d", GridNiches((2, 2), ((0, 1), (0, 1))))
     with pytest.raises(NichechainError, match="has no elites in its niches"):

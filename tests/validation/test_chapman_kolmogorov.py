@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from nichechain.births import NONE
-from nichechain.errors import NichechainError
+from nichechain.births.table import NONE
+from nichechain.core.errors import NichechainError
 from nichechain.validation import Triples, births_test, lineages_test, simulate_births, simulate_lineages
 from nichechain.validation.chapman_kolmogorov import _recombined
 

@@ -3,10 +3,10 @@ import pytest
 from scipy import stats
 
 import nichechain as nc
-from nichechain.births import NONE
+from nichechain.births.table import NONE
+from nichechain.core.errors import NichechainError
+from nichechain.core.randomness import Purpose, keyed
 from nichechain.domains import Evaluation, PlanarArm
-from nichechain.errors import NichechainError
-from nichechain.randomness import Purpose, keyed
 from nichechain.validation import Lineages, compare, run_lineages, sample_roots, simulate_lineages
 from nichechain.validation.simulate import RowSampler
 

@@ -4,8 +4,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from nichechain.births import NONE
-from nichechain.errors import NichechainError
+from nichechain.births.table import NONE
+from nichechain.core.errors import NichechainError
 from nichechain.validation import Triples
 
 

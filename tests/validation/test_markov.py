@@ -6,7 +6,7 @@ import pytest
 from scipy import stats
 
 import nichechain as nc
-from nichechain.errors import NichechainError
+from nichechain.core.errors import NichechainError
 from nichechain.validation import (
     Triples,
     births_test,

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 import nichechain as nc
 from nichechain.cli import main
-from nichechain.errors import NichechainError
+from nichechain.core.errors import NichechainError
 from nichechain.plots.calibration import plot_calibration, plot_reached
 from nichechain.validation import ValidationConfig, validate
 

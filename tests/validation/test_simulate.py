@@ -3,7 +3,7 @@ import pytest
 from scipy import stats
 
 import nichechain as nc
-from nichechain.errors import NichechainError
+from nichechain.core.errors import NichechainError
 from nichechain.validation import Triples, simulate_births, simulate_lineages
 
 from .conftest import local_chain, scattered_chain

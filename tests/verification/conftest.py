@@ -11,13 +11,14 @@ import pyarrow as pa
 import pytest
 from numpy.typing import ArrayLike
 
-from nichechain import births, store
-from nichechain.archive import Archive, load
-from nichechain.building import build
-from nichechain.config import BuildConfig
+from nichechain import births
+from nichechain.archive import read, write
+from nichechain.archive.archive import Archive, load
+from nichechain.archive.build import build
 from nichechain.domains import Evaluation, PlanarArm
 from nichechain.execution import Threads
-from nichechain.illumination import SearchState
+from nichechain.search.config import BuildConfig
+from nichechain.search.elites import SearchState
 
 # 333 births end in the middle of a step, so children are pending.
 CONFIG = BuildConfig(
@@ -61,10 +62,10 @@ class Forgery:
     def __init__(self, archive: Archive) -> None:
         self.meta = archive.meta
         self.niches = archive.niches
-        rows = store.read_births(archive.folder, archive.meta).to_pylist()
+        rows = read.read_births(archive.folder, archive.meta).to_pylist()
         # Python's own numbers, None for null.
         self.births = pd.DataFrame(rows, dtype=object)
-        self.state: SearchState = store.read_state(archive.folder, archive.meta)
+        self.state: SearchState = read.read_state(archive.folder, archive.meta)
 
     def set(self, uid: int, /, **values: object) -> None:
         """Values of a birth."""
@@ -101,7 +102,7 @@ class Forgery:
             for field in births.schema(axes)
         ]
         table = pa.Table.from_arrays(columns, schema=births.schema(axes))
-        writer = store.Writer(folder, self.meta.config, self.meta.facts, self.meta.origin, niches=self.niches)
+        writer = write.Writer(folder, self.meta.config, self.meta.facts, self.meta.origin, niches=self.niches)
         writer.append(table)
         writer.commit(self.state)
         return load(folder, domain=RoughArm())

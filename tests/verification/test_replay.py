@@ -7,8 +7,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from nichechain import variation
-from nichechain.births import NONE
-from nichechain.randomness import Purpose, keyed
+from nichechain.births.table import NONE
+from nichechain.core.randomness import Purpose, keyed
 from nichechain.verification.replay import ancestry, replayed
 
 

@@ -10,16 +10,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from nichechain import store
-from nichechain.archive import Archive, load
-from nichechain.config import BuildConfig
+from nichechain.archive.archive import Archive, load
+from nichechain.archive.merge import merge
+from nichechain.core.errors import ArchiveError, NichechainError
+from nichechain.core.machine import library_versions
+from nichechain.core.randomness import Purpose, keyed
 from nichechain.domains import PlanarArm
-from nichechain.errors import ArchiveError, NichechainError
 from nichechain.execution import Threads
 from nichechain.execution.base import WORKER_DIED
-from nichechain.merging import merge
 from nichechain.niches import CVTNiches
-from nichechain.randomness import Purpose, keyed
+from nichechain.search.config import BuildConfig
 from nichechain.verification import Progress, Verification, verify
 
 from .conftest import CONFIG, Forgery, RoughArm, built
@@ -424,10 +424,9 @@ def test_another_library_or_machine_explains_other_evaluations(
 ) -> None:
     from nichechain.verification import verifying
 
-    where = "library_versions" if name in store.library_versions() else "machine"
-    home = store if where == "library_versions" else verifying
-    present = {**getattr(home, where)(), name: "9.9"}
-    monkeypatch.setattr(home, where, lambda: present)
+    where = "library_versions" if name in library_versions() else "machine"
+    present = {**getattr(verifying, where)(), name: "9.9"}
+    monkeypatch.setattr(verifying, where, lambda: present)
     result = verify(load(genuine.folder, domain=Edited()), sample=5)
     assert [difference.name for difference in result.differences] == [name]
     assert not result.ok
@@ -443,8 +442,8 @@ def test_no_library_explains_a_contradiction(
 ) -> None:
     forgery.set(_fine(forgery), depth=1)
     archive = forgery.sealed(tmp_path)
-    changed = dict.fromkeys(store.library_versions(), "9.9")
-    monkeypatch.setattr(store, "library_versions", lambda: changed)
+    changed = dict.fromkeys(library_versions(), "9.9")
+    monkeypatch.setattr("nichechain.verification.verifying.library_versions", lambda: changed)
     result = verify(archive, sample=5)
     assert [check.group for check in result.unexplained] == ["record"]
 
@@ -452,7 +451,7 @@ def test_no_library_explains_a_contradiction(
 def test_an_archive_that_does_not_tell_its_machine(genuine: Archive, tmp_path: Path) -> None:
     import json
 
-    from nichechain.committed import checksum
+    from nichechain.archive.read import checksum
 
     for path in genuine.folder.rglob("*.*"):
         copy = tmp_path / path.relative_to(genuine.folder)
@@ -545,7 +544,7 @@ def test_a_domain_of_another_length_is_not_verified(genuine: Archive) -> None:
 
 
 def test_imported_births_are_verified_as_far_as_they_go(tmp_path: Path) -> None:
-    from nichechain.importing import Columns, import_births
+    from nichechain.archive.imported import Columns, import_births
     from nichechain.niches import GridNiches
 
     (tmp_path / "log.csv").write_text("px,py,x,y\n,,0.1,0.2\n0.1,0.2,0.5,-0.5\n0.1,0.2,,\n")

@@ -10,14 +10,13 @@ import pytest
 from scipy.spatial import distance
 from scipy.stats import multivariate_normal
 
-from nichechain import NichechainError, diversity, landscape, variation
-from nichechain.births import schema
-from nichechain.diversity import ArchiveRule, KNearest, ParentDistance
+from nichechain import NichechainError, landscape, variation
+from nichechain.births.table import schema
+from nichechain.core.randomness import Purpose, keyed
 from nichechain.domains import PlanarArm
 from nichechain.domains.base import Evaluation
 from nichechain.execution import Threads
 from nichechain.niches import GridNiches
-from nichechain.randomness import Purpose, keyed
 from nichechain.walks import (
     AtLeast,
     BetterThanParent,
@@ -27,10 +26,12 @@ from nichechain.walks import (
     WalkConfig,
     Walks,
     WalkState,
+    diversity,
     draw_starts,
     run_seed,
     walk,
 )
+from nichechain.walks.diversity import ArchiveRule, KNearest, ParentDistance
 
 
 class RoughArm(PlanarArm):

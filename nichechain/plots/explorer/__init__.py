@@ -19,17 +19,17 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from nichechain.arguments import check_whole
 from nichechain.chain.displacement import GridDisplacement
-from nichechain.chain.draws import transition_draws
-from nichechain.chain.graph import LONG_JUMP
-from nichechain.chain.wormholes import wormholes
-from nichechain.coverage import check_lengths, coverage_by_generation
-from nichechain.errors import NichechainError
+from nichechain.chain.structure.graph import LONG_JUMP
+from nichechain.chain.structure.wormholes import wormholes
+from nichechain.core.checks import check_whole
+from nichechain.core.errors import NichechainError
+from nichechain.evolvability.coverage import check_lengths, coverage_by_generation
+from nichechain.evolvability.roots import transition_draws
 from nichechain.niches import GridNiches
 
 if TYPE_CHECKING:
-    from nichechain.archive import Archive
+    from nichechain.archive.archive import Archive
     from nichechain.chain import NicheChain
 
 Floats = NDArray[np.float64]

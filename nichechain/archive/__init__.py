@@ -1,0 +1,1 @@
+"""An archive is a folder: elites, births, and what made them."""

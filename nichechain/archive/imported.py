@@ -1,0 +1,356 @@
+"""Births of another program's search, from a table of parents and children."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+from numpy.typing import ArrayLike, NDArray
+
+from nichechain import births
+from nichechain.archive import read, write
+from nichechain.births.table import NONE, Offspring
+from nichechain.core.errors import ArchiveError, NichechainError
+from nichechain.core.locking import writing
+from nichechain.niches import Niches
+from nichechain.search.config import BuildConfig
+from nichechain.search.elites import Elites, SearchState
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+DOMAIN = "imported"
+_UNKNOWN = "the log has no child"
+
+
+@dataclass(frozen=True)
+class Columns:
+    """Which columns of a log are what.
+
+    Parameters
+    ----------
+    parent, child : str or tuple of str
+        One name: states by their number, the niches of the grid in C order and then the outside
+        state. A tuple of names: behavior, one column for each axis of the grid. A null or NaN
+        parent is that of an initial birth, such a child failed.
+    run : str, optional
+        What tells runs apart: whole numbers or words, renumbered in sorted order.
+    uid : str, optional
+        Number of the child within its run; by default births are numbered in the order of the log.
+    elite : str, optional
+        Number of the parent within its run, which tells siblings from cousins.
+    step : str, optional
+        Step of the search.
+    """
+
+    parent: str | tuple[str, ...] = "parent_niche"
+    child: str | tuple[str, ...] = "child_niche"
+    run: str | None = None
+    uid: str | None = None
+    elite: str | None = None
+    step: str | None = None
+
+    @property
+    def names(self) -> list[str]:
+        """All columns that are read."""
+        of_states = [
+            [given] if isinstance(given, str) else list(given) for given in (self.parent, self.child)
+        ]
+        others = [name for name in (self.run, self.uid, self.elite, self.step) if name is not None]
+        return list(dict.fromkeys([*of_states[0], *of_states[1], *others]))
+
+
+@dataclass(frozen=True)
+class Axes:
+    """What the axes of behavior are called, for figures.
+
+    Parameters
+    ----------
+    names : tuple of str
+        By default the names of the columns of a child's behavior, or axis_0, axis_1, ….
+    unit : str
+    """
+
+    names: tuple[str, ...] = ()
+    unit: str = "units"
+
+
+def import_births(
+    log: str | Path,
+    folder: str | Path,
+    niches: Niches,
+    *,
+    columns: Columns | None = None,
+    axes: Axes | None = None,
+) -> None:
+    """Make an archive of the births that a log of another search tells of.
+
+    The archive has births, and with them counts and a chain, but no elites: genotypes, domain and
+    mutation are not known, so nothing can be evaluated.
+
+    Parameters
+    ----------
+    log : path
+        A CSV file with a header, or Parquet; one row per evaluated child.
+    folder : path
+        Where the archive goes; it must not hold one.
+    niches : Niches
+    columns : Columns, optional
+    axes : Axes, optional
+
+    Raises
+    ------
+    NichechainError
+        If the log cannot be read, a column is missing or holds what it must not.
+    ArchiveError
+        If the folder holds an archive.
+    """
+    columns, axes = columns or Columns(), axes or Axes()
+    try:
+        content = Path(log).read_bytes()
+    except OSError as error:
+        raise NichechainError(f"{log} cannot be read: {error.strerror}") from error
+    table = _read(Path(log), content)
+    missing = [name for name in columns.names if name not in table.column_names]
+    if missing:
+        raise NichechainError(f"{log} has no column {missing[0]!r}: it has {', '.join(table.column_names)}")
+    if not len(table):
+        raise NichechainError(f"{log} has no rows, but every birth is one")
+    if not (axes.names or isinstance(columns.child, str)):
+        axes = replace(axes, names=columns.child)
+    rows = _Reader(table, niches).births(columns)
+    origin = {
+        "kind": "imported",
+        "file": Path(log).name,
+        "sha256": hashlib.sha256(content).hexdigest(),
+        "columns": {name: value for name, value in vars(columns).items() if value is not None},
+    }
+    write_archive(folder, niches, rows, origin, axes)
+
+
+def write_archive(
+    folder: str | Path,
+    niches: Niches,
+    rows: pa.Table,
+    origin: dict[str, Any],
+    axes: Axes,
+    *,
+    state: SearchState | None = None,
+    objective_name: str = "objective",
+) -> None:
+    """Make an archive of births that no build made.
+
+    Parameters
+    ----------
+    folder : path
+        Where the archive goes; it must not hold one.
+    niches : Niches
+    rows : pyarrow.Table
+        Births.
+    origin : dict
+        Where they come from: ``kind`` is ``imported``, and the rest tells of what.
+    axes : Axes
+    state : SearchState, optional
+        Elites, by default none.
+    objective_name : str
+
+    Raises
+    ------
+    NichechainError
+        If there are more or fewer names than axes.
+    ArchiveError
+        If the folder holds an archive.
+    """
+    folder = Path(folder)
+    dimensions = len(niches.bounds)
+    facts = read.DomainFacts(_axis_names(axes, dimensions), axes.unit, objective_name, None)
+    config = BuildConfig(
+        DOMAIN,
+        evaluations=len(rows),
+        replacement="random" if state is None else "objective",
+        **niches.settings(),
+    )
+    with writing(folder):
+        if read.is_archive(folder):
+            raise ArchiveError(f"{folder} already holds an archive: import into another folder")
+        writer = write.Writer(folder, config, facts, origin, niches=niches)
+        writer.append(rows)
+        writer.commit(state or _nothing_to_go_on_with(len(rows), dimensions))
+
+
+def _read(log: Path, content: bytes) -> pa.Table:
+    import pyarrow.csv
+    import pyarrow.parquet
+
+    kind = log.suffix.lower()
+    if kind not in (".csv", ".parquet"):
+        raise NichechainError(f"{log} is neither a .csv nor a .parquet file, which are what can be imported")
+    try:
+        source = pa.BufferReader(content)
+        return pyarrow.csv.read_csv(source) if kind == ".csv" else pyarrow.parquet.read_table(source)
+    except pa.ArrowException as error:
+        reason = str(error).splitlines()[0]
+        raise NichechainError(f"{log} cannot be read as {kind[1:].upper()}: {reason}") from error
+
+
+def _axis_names(axes: Axes, dimensions: int) -> tuple[str, ...]:
+    if axes.names:
+        if len(axes.names) != dimensions:
+            raise NichechainError(f"axes are {', '.join(axes.names)}, but the grid has {dimensions}")
+        return axes.names
+    return tuple(f"axis_{axis}" for axis in range(dimensions))
+
+
+def _nothing_to_go_on_with(number: int, dimensions: int) -> SearchState:
+    whole, real = np.empty(0, np.int64), np.empty(0)
+    none = np.empty((0, 0), np.float32)
+    elites = Elites(whole, none, np.empty((0, dimensions)), real, real, whole, whole)
+    return SearchState(elites, Offspring(none, whole, whole, whole, whole), number, 0)
+
+
+@dataclass(frozen=True)
+class _Reader:
+    """Reads columns of a log, and says in which row something is wrong."""
+
+    table: pa.Table
+    niches: Niches
+
+    def births(self, columns: Columns) -> pa.Table:
+        """The rows as births."""
+        size, dimensions = len(self.table), len(self.niches.bounds)
+        parent, _ = self._states(columns.parent)
+        child, behavior = self._states(columns.child)
+        run = self._runs(columns.run)
+        uid = self._whole(columns.uid, lowest=0) if columns.uid else _within_runs(run)
+        elite = self._whole(columns.elite, lowest=0, nulls=True) if columns.elite else np.full(size, NONE)
+        step = self._whole(columns.step, lowest=0, nulls=True) if columns.step else np.full(size, NONE)
+        if columns.uid:
+            _check_unique(run, uid, columns.uid)
+        lost = (parent != NONE) & (elite == NONE) if columns.elite else np.zeros(size, bool)
+        if lost.any():
+            raise NichechainError(
+                f"row {_row(lost)} has a parent's niche but no {columns.elite}: "
+                "leave the column out, or fill it"
+            )
+        gone = child == NONE
+        nothing = pa.nulls(size)
+        failed = np.where(gone, _UNKNOWN, "")
+        arrays = [
+            run,
+            uid,
+            pa.array(elite, mask=(elite == NONE) | (parent == NONE)),
+            # How many generations lie behind a birth, and who was accepted, a log does not say.
+            nothing,
+            pa.array(parent, mask=parent == NONE),
+            pa.array(child, mask=gone),
+            *(
+                nothing if behavior is None else pa.array(behavior[:, axis], mask=gone)
+                for axis in range(dimensions)
+            ),
+            nothing,
+            nothing,
+            pa.array(failed, pa.string(), mask=~gone),
+            pa.array(step, mask=step == NONE),
+        ]
+        schema = births.schema(dimensions)
+        try:
+            cast = [pa.array(array).cast(kind.type) for array, kind in zip(arrays, schema, strict=True)]
+        except pa.ArrowInvalid as error:
+            raise NichechainError(f"a number is too large to be imported: {error}") from error
+        return pa.Table.from_arrays(cast, schema=schema)
+
+    def _states(self, given: str | tuple[str, ...]) -> tuple[Ints, Floats | None]:
+        """States, and behavior where that is what is given."""
+        if isinstance(given, str):
+            state = self._whole(given, lowest=0, nulls=True)
+            odd = state >= self.niches.states
+            if odd.any():
+                at = _row(odd)
+                raise NichechainError(
+                    f"row {at} has {given} {state[at - 1]}, but states run from 0 to {self.niches.states - 1}"
+                )
+            return state, None
+        axes = len(self.niches.bounds)
+        if len(given) != axes:
+            raise NichechainError(f"behavior has columns {', '.join(given)}, but the grid has {axes} axes")
+        behavior = np.stack([self._numbers(name) for name in given], axis=1)
+        known = ~np.isnan(behavior).any(axis=1)
+        state = np.full(len(behavior), NONE, np.int64)
+        endless = known & np.isinf(behavior).any(axis=1)
+        if endless.any():
+            raise NichechainError(f"row {_row(endless)} has an infinite behavior, which belongs to no niche")
+        state[known] = self.niches.of(behavior[known])
+        return state, behavior
+
+    def _numbers(self, name: str) -> Floats:
+        column = self.table[name]
+        if not (
+            pa.types.is_integer(column.type)
+            or pa.types.is_floating(column.type)
+            or column.null_count == len(column)
+        ):
+            raise NichechainError(f"column {name!r} has values of type {column.type}, but must have numbers")
+        numbers: Floats = column.cast(pa.float64()).fill_null(np.nan).to_numpy().astype(np.float64)
+        return numbers
+
+    def _whole(self, name: str, *, lowest: int, nulls: bool = False) -> Ints:
+        column = self.table[name]
+        # Numbers beyond 2**53 would not survive being floating-point.
+        if pa.types.is_integer(column.type) and not column.null_count:
+            whole: Ints = column.to_numpy().astype(np.int64)
+            none = np.zeros(whole.size, bool)
+        else:
+            values = self._numbers(name)
+            none = np.isnan(values)
+            odd = ~none & (values != np.floor(values))
+            if odd.any():
+                raise NichechainError(
+                    f"row {_row(odd)} has {name} {values[odd][0]:g}, but must have a whole number"
+                )
+            whole = np.where(none, NONE, values).astype(np.int64)
+        low = ~none & (whole < lowest)
+        if low.any():
+            raise NichechainError(f"row {_row(low)} has {name} {whole[low][0]}, but must not be negative")
+        if none.any() and not nulls:
+            raise NichechainError(f"row {_row(none)} has no {name}, but every birth must have one")
+        return whole
+
+    def _runs(self, name: str | None) -> Ints:
+        if name is None:
+            return np.zeros(len(self.table), np.int64)
+        column = self.table[name]
+        if column.null_count:
+            raise NichechainError(
+                f"row {_row(column.is_null().to_numpy())} has no {name}, but every birth must have one"
+            )
+        known = pc.unique(column).to_pylist()
+        number = {run: k for k, run in enumerate(sorted(known))}
+        return np.array([number[run] for run in column.to_pylist()], np.int64)
+
+
+def _within_runs(run: Ints) -> Ints:
+    """Numbers from 0 within each run."""
+    uid = np.empty_like(run)
+    for number in range(int(run.max()) + 1):
+        own = run == number
+        uid[own] = np.arange(np.count_nonzero(own))
+    return uid
+
+
+def _check_unique(run: Ints, uid: Ints, name: str) -> None:
+    pairs, index = np.unique(np.stack([run, uid]), axis=1, return_index=True)
+    if pairs.shape[1] < run.size:
+        again = np.setdiff1d(np.arange(run.size), index)[0]
+        raise NichechainError(
+            f"row {again + 1} has {name} {uid[again]} again, but births of a run differ in it"
+        )
+
+
+def _row(odd: ArrayLike) -> int:
+    """Number of the first odd row, the first being row 1."""
+    return int(np.argmax(odd)) + 1

@@ -1,0 +1,169 @@
+"""Archives of several runs of one search as one archive."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+
+from nichechain.archive import read, write
+from nichechain.births.table import Offspring
+from nichechain.core.errors import ArchiveError, NichechainError
+from nichechain.core.locking import writing
+from nichechain.niches import Niches
+from nichechain.search.config import BuildConfig
+from nichechain.search.elites import Elites, SearchState
+
+# What archives must have in common: what T is about, and what makes a birth an elite.
+_SHARED = (
+    "domain",
+    "domain_seed",
+    "domain_options",
+    "niches",
+    "niches_seed",
+    "shape",
+    "bounds",
+    "outside",
+    "mutation",
+    "scale",
+    "df",
+    "step_bound",
+    "layer_scales",
+    "self_adaptive",
+    "replacement",
+)
+
+
+def merge(folders: Sequence[str | Path], out: str | Path) -> None:
+    """Make one archive of several.
+
+    Births are put one after the other, runs and births numbered on, so that counts add. The elite of
+    a niche is the birth with the largest key, as if one search had met them all; the birth
+    of the earlier run stays where keys are equal. What was pending is dropped: no build goes on
+    with the result.
+
+    Parameters
+    ----------
+    folders : sequence of paths
+        At least two archives of the same domain, niches, mutation and replacement. They may be
+        merged themselves.
+    out : path
+        Where the result goes; it must not hold an archive.
+
+    Raises
+    ------
+    NichechainError
+        If there are fewer than two archives, or they do not belong together.
+    ArchiveError
+        If a folder is no archive, or ``out`` is one.
+
+    Notes
+    -----
+    ``meta.origin["runs"]`` has, for every run of the result, its configuration, its number of
+    births and the uid of its first: the uid that a birth had in its own run is what lies above.
+    """
+    paths, out = [Path(folder) for folder in folders], Path(out)
+    if len(paths) < 2:
+        raise NichechainError(f"{len(paths)} archive cannot be merged: give at least two")
+    metas = [read.read_meta(path) for path in paths]
+    runs = _runs(paths, metas)
+    niches = _niches(paths, metas)
+    # Checked before anything is read at length.
+    if read.is_archive(out):
+        raise ArchiveError(f"{out} already holds an archive: merge into another folder")
+    tables, elites = [], []
+    first_run = first_uid = 0
+    for path, meta in zip(paths, metas, strict=True):
+        tables.append(_renumbered(read.read_births(path, meta), first_run, first_uid))
+        own = read.read_state(path, meta).elites
+        elites.append(replace(own, uid=own.uid + first_uid))
+        first_run += len(meta.origin["runs"]) if meta.origin is not None else 1
+        first_uid += meta.births
+    births = pa.concat_tables(tables)
+    config = replace(metas[0].config, evaluations=len(births))
+    none = np.empty(0, np.int64)
+    length = elites[0].genotype.shape[1]
+    pending = Offspring(np.empty((0, length), np.float32), none, none, none, none)
+    state = SearchState(_largest(elites), pending, len(births), max(meta.step for meta in metas))
+    with writing(out):
+        if read.is_archive(out):
+            raise ArchiveError(f"{out} already holds an archive: merge into another folder")
+        origin = {"kind": "merged", "runs": runs}
+        writer = write.Writer(out, config, metas[0].facts, origin, niches=niches)
+        writer.append(births)
+        writer.commit(state)
+
+
+def _runs(paths: list[Path], metas: list[read.Meta]) -> list[dict[str, Any]]:
+    """One entry per run of the result, after checking that the archives belong together."""
+    runs: list[dict[str, Any]] = []
+    owner: list[Path] = []
+    for path, meta in zip(paths, metas, strict=True):
+        if meta.imported:
+            raise NichechainError(
+                f"{path} was imported: import both logs as one, with a column of runs, instead"
+            )
+        for name in _SHARED:
+            ours, theirs = getattr(metas[0].config, name), getattr(meta.config, name)
+            if ours != theirs:
+                raise NichechainError(
+                    f"{paths[0]} has {name} {ours} and {path} has {theirs}, but must have the same"
+                )
+        first = sum(run["births"] for run in runs)
+        if meta.origin is None:
+            own: list[dict[str, Any]] = [
+                {"config": meta.config.to_json(), "births": meta.births, "first_uid": 0}
+            ]
+        else:
+            own = meta.origin["runs"]
+        for run in own:
+            for other, whose in zip(runs, owner, strict=True):
+                if _same_search(run["config"], other["config"]):
+                    raise NichechainError(
+                        f"{whose} and {path} both have the run of seed {run['config']['seed']}, "
+                        "whose births would count twice"
+                    )
+        for run in own:
+            runs.append({**run, "first_uid": first + run["first_uid"]})
+            owner.append(path)
+    return runs
+
+
+def _niches(paths: list[Path], metas: list[read.Meta]) -> Niches:
+    """The niches of all archives: those of one seed can still differ, as libraries do."""
+    first, *others = (read.read_niches(path, meta) for path, meta in zip(paths, metas, strict=True))
+    for path, niches in zip(paths[1:], others, strict=True):
+        if niches != first:
+            raise NichechainError(f"{paths[0]} and {path} have different centroids, but must have the same")
+    return first
+
+
+def _same_search(first: dict[str, Any], second: dict[str, Any]) -> bool:
+    """Whether two configurations differ in nothing but how far they go."""
+    # What an earlier version stored lacks the values that came later, and has lists for tuples.
+    ours, theirs = BuildConfig.from_json(first), BuildConfig.from_json(second)
+    return replace(ours, evaluations=theirs.evaluations) == theirs
+
+
+def _renumbered(births: pa.Table, first_run: int, first_uid: int) -> pa.Table:
+    """Births with the numbers of their runs, themselves and their parents moved on."""
+    for name, by in (("run", first_run), ("uid", first_uid), ("parent_uid", first_uid)):
+        kind = births.schema.field(name)
+        moved = pc.add(births[name], pa.scalar(by, kind.type))
+        births = births.set_column(births.schema.get_field_index(name), kind, moved)
+    return births
+
+
+def _largest(elites: list[Elites]) -> Elites:
+    """Of every state, the elite with the largest key; of equal keys that with the smallest uid."""
+    pooled = elites[0]
+    for more in elites[1:]:
+        pooled = Elites.concatenate(pooled, more)
+    pooled = pooled[np.lexsort((pooled.uid, -pooled.key, pooled.niche))]
+    _, first = np.unique(pooled.niche, return_index=True)
+    return pooled[first]

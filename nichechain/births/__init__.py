@@ -1,0 +1,5 @@
+"""Births: one row for every evaluated child, the currency of everything after."""
+
+from nichechain.births.table import NONE, Offspring, check_columns, schema, table
+
+__all__ = ["NONE", "Offspring", "check_columns", "schema", "table"]

@@ -1,0 +1,175 @@
+"""Arguments that are not what they must be, refused where they come in: one sentence, not a traceback."""
+
+from __future__ import annotations
+
+import math
+import operator
+from collections.abc import Mapping
+from numbers import Integral, Real
+from typing import TYPE_CHECKING, TypeAlias
+
+from nichechain.core.errors import NichechainError
+
+DomainOption: TypeAlias = str | int | float | bool
+"""What a domain can be told besides its seed."""
+
+if TYPE_CHECKING:
+    # A configuration is checked without NumPy, which takes its time to import.
+    import numpy as np
+    from numpy.typing import ArrayLike, NDArray
+
+
+def check_whole(**values: object) -> None:
+    """Refuse what is no whole number.
+
+    Parameters
+    ----------
+    **values
+        By the names that the caller knows them by; their range is the caller's to check.
+
+    Raises
+    ------
+    NichechainError
+        If a value is of another type: a float is refused even where its value is whole.
+    """
+    for name, value in values.items():
+        if not isinstance(value, Integral):
+            raise NichechainError(f"{name} is {value!r}, but must be a whole number")
+
+
+def check_numbers(**values: object) -> None:
+    """Refuse what is no number. NaN is one: whether it is allowed is the caller's to check.
+
+    Raises
+    ------
+    NichechainError
+        If a value is neither a float nor a whole number.
+    """
+    for name, value in values.items():
+        if not isinstance(value, Real):
+            raise NichechainError(f"{name} is {value!r}, but must be a number")
+
+
+def check_seed(seed: object) -> None:
+    """Refuse what cannot seed a generator.
+
+    Raises
+    ------
+    NichechainError
+        If it is no whole number, or a negative one.
+    """
+    check_whole(seed=seed)
+    if seed < 0:  # type: ignore[operator]
+        raise NichechainError(f"seed is {seed}, but must not be negative")
+
+
+def check_sample(n: object) -> None:
+    """Refuse what is no number of genotypes to sample: none at all is one.
+
+    Raises
+    ------
+    NichechainError
+        If it is no whole number, or a negative one.
+    """
+    check_whole(n=n)
+    if n < 0:  # type: ignore[operator]
+        raise NichechainError(f"n is {n}, but must not be negative")
+
+
+def rng_of(seed: int | np.random.Generator) -> np.random.Generator:
+    """The generator itself, or the one of a seed.
+
+    Raises
+    ------
+    NichechainError
+        If the seed is negative or no whole number.
+    """
+    import numpy as np
+
+    if isinstance(seed, np.random.Generator):
+        return seed
+    check_seed(seed)
+    return np.random.default_rng(seed)
+
+
+def as_floats(name: str, values: ArrayLike) -> NDArray[np.float64]:
+    """Values as a float64 array of any shape.
+
+    Raises
+    ------
+    NichechainError
+        If they are no numbers, or rows of unequal length.
+    """
+    import numpy as np
+
+    try:
+        return np.asarray(values, np.float64)
+    except (TypeError, ValueError):
+        raise NichechainError(f"{name} has values that are no numbers, or rows of unequal length") from None
+
+
+def as_whole(name: str, values: ArrayLike) -> NDArray[np.int64]:
+    """Values as an int64 array of any shape.
+
+    Raises
+    ------
+    NichechainError
+        If they are not whole numbers, which a cast would silently cut, or rows of unequal length.
+    """
+    import numpy as np
+
+    try:
+        given = np.asarray(values)
+        with np.errstate(invalid="ignore"):
+            whole = given.astype(np.int64)
+    except (TypeError, ValueError, OverflowError):
+        raise NichechainError(
+            f"{name} has values that are no whole numbers, or rows of unequal length"
+        ) from None
+    if given.dtype.kind not in "iub" and not np.array_equal(given.astype(np.float64), whole):
+        odd = given.ravel()[given.astype(np.float64).ravel() != whole.ravel()]
+        raise NichechainError(f"{name} has the value {odd[0]}, but must have whole numbers")
+    return whole
+
+
+def as_shape(shape: object) -> tuple[int, ...]:
+    """Cells along each axis of a grid, as whole numbers.
+
+    Raises
+    ------
+    NichechainError
+        If it is no sequence of them.
+    """
+    try:
+        return tuple(operator.index(cells) for cells in shape)  # type: ignore[attr-defined]
+    except TypeError:
+        raise NichechainError(f"shape is {shape!r}, but must be whole numbers such as (20, 20)") from None
+
+
+def as_bounds(bounds: object) -> tuple[tuple[float, float], ...]:
+    """Lower and upper bound of each axis of behavior, as floats.
+
+    Raises
+    ------
+    NichechainError
+        If it is no sequence of pairs of numbers.
+    """
+    try:
+        return tuple((float(low), float(high)) for low, high in bounds)  # type: ignore[attr-defined]
+    except (TypeError, ValueError):
+        raise NichechainError(
+            f"bounds are {bounds!r}, but must be a pair of numbers for each axis, such as ((0, 1), (0, 1))"
+        ) from None
+
+
+def plain_options(options: Mapping[str, DomainOption]) -> dict[str, DomainOption]:
+    """Options in the order of their names, so that equal ones are written alike."""
+    if not isinstance(options, Mapping):
+        raise NichechainError(f"domain_options is {options!r}, but must map names to values")
+    for name, value in options.items():
+        fits = isinstance(value, (str, int)) or (isinstance(value, float) and math.isfinite(value))
+        if not isinstance(name, str) or not fits:
+            raise NichechainError(
+                f"domain option {name!r} is {value!r}, but must be a text, a finite number, or true or false"
+            )
+    return {name: options[name] for name in sorted(options)}

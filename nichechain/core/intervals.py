@@ -1,0 +1,39 @@
+"""Means over runs, with their intervals."""
+
+from __future__ import annotations
+
+import warnings
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Floats = NDArray[np.float64]
+
+LEVEL = 0.95
+"""Level of every interval over runs."""
+
+
+def mean_interval(values: ArrayLike) -> tuple[Floats, Floats, Floats]:
+    """Mean over runs with its t-interval.
+
+    Parameters
+    ----------
+    values : (N, ...) array
+        One row per run; NaN where a run has no value.
+
+    Returns
+    -------
+    mean, low, high : (...) arrays
+        The bounds are NaN where fewer than two runs have a value, and so is the mean where none has.
+    """
+    from scipy import stats
+
+    value = np.asarray(values, np.float64)
+    n = (~np.isnan(value)).sum(axis=0)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)
+        mean = np.nanmean(value, axis=0)
+        error = stats.sem(value, axis=0, nan_policy="omit")
+    # With no spread the interval is a point, for which SciPy gives NaN.
+    half = np.where(n > 1, stats.t.ppf((1 + LEVEL) / 2, np.maximum(n - 1, 1)) * error, np.nan)
+    return np.asarray(mean), np.asarray(mean - half), np.asarray(mean + half)

@@ -1,0 +1,1 @@
+"""Policies: controllers of genotypes, networks, and the spaces that they act in."""

@@ -1,0 +1,337 @@
+"""How many niches independent lineages visit: in closed form, by simulation, by rarefaction."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy import sparse
+from scipy.special import gammaln
+
+from nichechain.core.checks import as_whole, check_whole
+from nichechain.core.errors import NichechainError
+from nichechain.core.row_sampler import RowSampler
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+# Cells of the table (repeats, niches) and walks in flight that a simulation keeps at once.
+_SIMULATION_CELLS = 8_000_000
+
+# Target niches treated together.
+_COLUMNS = 128
+
+# Above this share of nonzeros a dense product is faster than a sparse one.
+_DENSE = 0.3
+
+
+class LinearMap(Protocol):
+    """A matrix we only multiply with: sparse, dense, or sparse plus low rank."""
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Rows and columns."""
+        ...
+
+    def __matmul__(self, other: Floats, /) -> Floats: ...
+
+
+def expected_coverage(
+    transition: LinearMap,
+    first: LinearMap,
+    generations: int,
+    lineages: ArrayLike,
+    *,
+    counted: int | None = None,
+    columns: int = _COLUMNS,
+) -> Floats:
+    """Expected number of distinct niches that independent lineages visit: l-evolvability.
+
+    Parameters
+    ----------
+    transition : (S, S) row-stochastic map
+        ``transition[i, j]`` = P(child in state j | parent in state i).
+    first : (m, S) map
+        Distribution of generation 1 for each of m roots; ``transition`` itself for all states.
+    generations : int
+        Length l of a lineage, at least 1.
+    lineages : int or (k,) ints
+        Number U of independent lineages per root, at least 1; several are answered together.
+    counted : int, optional
+        Only the first so many states are niches that count; by default all are.
+    columns : int
+        Target niches treated together. Peak memory is about ``16 * (S + m) * columns`` bytes.
+
+    Returns
+    -------
+    (m,) or (m, k) array
+        Niches visited at least once, in expectation.
+
+    Raises
+    ------
+    NichechainError
+        If ``generations`` or ``lineages`` is below 1.
+
+    Notes
+    -----
+    E = Σ_j 1 − (1 − h_j)^U, where h_j is the probability that one lineage
+    visits niche j.
+    """
+    sizes = _sizes(lineages)
+    check_lengths(generations, sizes.min())
+    coverage = np.zeros((first.shape[0], sizes.size))
+    for _, visited in visit_probabilities(transition, first, generations, counted, columns):
+        for k, size in enumerate(sizes):
+            coverage[:, k] += _at_least_once(visited, int(size)).sum(axis=1)
+    return coverage if np.ndim(lineages) else coverage[:, 0]
+
+
+def visit_probabilities(
+    transition: LinearMap,
+    first: LinearMap,
+    generations: int,
+    counted: int | None = None,
+    columns: int = _COLUMNS,
+) -> Iterator[tuple[Ints, Floats]]:
+    """Probabilities h that one lineage visits each niche, a block of niches at a time.
+
+    Yields
+    ------
+    (c,) int64 array and (m, c) float64 array
+        Some niches, and h for each of the m roots.
+
+    Notes
+    -----
+    With H_k[i, j] = P(j is i or occurs within k transitions from i), conditioning on the first
+    transition gives H_k = T · H_{k−1} with its diagonal set to 1. Columns of H do not depend on
+    each other, so a block of them at a time bounds the memory.
+    """
+    states = transition.shape[0]
+    niches = _counted(counted, states)
+    check_whole(columns=columns)
+    if columns < 1:
+        raise NichechainError(f"columns is {columns}, but must be at least 1")
+    transition = _faster(transition)
+    for start in range(0, niches, columns):
+        targets = np.arange(start, min(start + columns, niches))
+        hit = np.zeros((states, targets.size))
+        hit[targets, targets - start] = 1.0
+        for _ in range(generations - 1):
+            hit = transition @ hit
+            # A lineage that stands on its target has visited it, wherever it goes next.
+            hit[targets, targets - start] = 1.0
+        yield targets, first @ hit
+
+
+def coverage_by_generation(
+    transition: LinearMap, roots: ArrayLike, generations: int, lineages: ArrayLike, counted: int
+) -> Floats:
+    """Expected niches that lineages of roots visit, for every length up to the longest.
+
+    Parameters
+    ----------
+    transition : (S, S) row-stochastic matrix
+    roots : (m,) ints
+        States that the roots stand in; generation 1 is drawn from their rows.
+    generations : int
+        The longest lineage l, at least 1.
+    lineages : (k,) ints
+        Numbers U of lineages, each at least 1.
+    counted : int
+        Only the first so many states are niches that count.
+
+    Returns
+    -------
+    (m, generations, k) float64 array
+        Entry [i, g − 1, u] is what :func:`expected_coverage` gives for g
+        generations.
+
+    Notes
+    -----
+    With first rows out of T itself, T · H_{g−1} is at once the answer for g generations and, its
+    diagonal set to 1, the H_g of the next: all lengths cost no more than the longest.
+    """
+    states = as_whole("roots", roots)
+    size = transition.shape[0]
+    if states.ndim != 1 or ((states < 0) | (states >= size)).any():
+        raise NichechainError(f"roots are {states.tolist()}, but must be states from 0 to {size - 1}")
+    counted = _counted(counted, size)
+    sizes = _sizes(lineages)
+    check_lengths(generations, sizes.min())
+    transition = _faster(transition)
+    found = np.zeros((states.size, generations, sizes.size))
+    for start in range(0, counted, _COLUMNS):
+        targets = np.arange(start, min(start + _COLUMNS, counted))
+        hit = np.zeros((transition.shape[0], targets.size))
+        hit[targets, targets - start] = 1.0
+        for step in range(generations):
+            hit = transition @ hit
+            with np.errstate(divide="ignore"):
+                missed = np.log1p(-np.minimum(hit[states], 1.0))
+            for k, size in enumerate(sizes):
+                found[:, step, k] -= np.expm1(int(size) * missed).sum(axis=1)
+            # A lineage that stands on its target has visited it, wherever it goes next.
+            hit[targets, targets - start] = 1.0
+    return found
+
+
+def sampled_coverage(
+    transition: LinearMap,
+    first: Floats,
+    generations: int,
+    lineages: int,
+    repeats: int,
+    rng: np.random.Generator,
+    *,
+    counted: int | None = None,
+) -> Ints:
+    """Numbers of niches visited in simulations: the paper's procedure, steps 5 to 7.
+
+    Parameters
+    ----------
+    transition : (S, S) row-stochastic matrix
+    first : (S,) array
+        Distribution of generation 1.
+    generations, lineages : int
+        Length and number of the walks of one repeat, at least 1.
+    repeats : int
+        How often to repeat, at least 1.
+    rng : numpy.random.Generator
+    counted : int, optional
+        Only the first so many states are niches that count; by default all are.
+
+    Returns
+    -------
+    (repeats,) int64 array
+
+    Raises
+    ------
+    NichechainError
+        If a number is below 1, or T has too many entries to walk by.
+    """
+    check_lengths(generations, lineages)
+    check_whole(repeats=repeats)
+    if repeats < 1:
+        raise NichechainError(f"repeats is {repeats}, but at least 1 is needed")
+    states = transition.shape[0]
+    niches = _counted(counted, states)
+    step = RowSampler(entries(transition))
+    start = RowSampler(sparse.csr_array(first[None, :]))
+    at_once = max(1, _SIMULATION_CELLS // max(states, lineages))
+    found = []
+    for done in range(0, repeats, at_once):
+        size = min(at_once, repeats - done)
+        repeat = np.repeat(np.arange(size), lineages)
+        seen = np.zeros((size, states), bool)
+        here = start.draw(np.zeros(size * lineages, np.int64), rng)
+        seen[repeat, here] = True
+        for _ in range(generations - 1):
+            here = step.draw(here, rng)
+            seen[repeat, here] = True
+        found.append(np.count_nonzero(seen[:, :niches], axis=1))
+    return np.concatenate(found)
+
+
+def entries(transition: LinearMap) -> sparse.csr_array:
+    """The entries of a matrix, to walk by.
+
+    Raises
+    ------
+    NichechainError
+        If it is neither an array nor sparse.
+    """
+    if not (isinstance(transition, np.ndarray) or sparse.issparse(transition)):
+        raise NichechainError(
+            f"T has {transition.shape[0]} states and too many entries to simulate walks: "
+            "ask for the exact value, or for fewer niches"
+        )
+    return sparse.csr_array(transition)
+
+
+def rarefied_coverage(counts: ArrayLike, size: int, *, counted: int | None = None) -> float:
+    """Expected number of niches among ``size`` of the offspring, drawn without replacement.
+
+    Parameters
+    ----------
+    counts : (S,) ints
+        Offspring observed in each state.
+    size : int
+        Between 1 and their sum.
+    counted : int, optional
+        Only the first so many states are niches that count; by default all are.
+
+    Returns
+    -------
+    float
+        The observed number of niches, exactly, where ``size`` is the sum.
+
+    Raises
+    ------
+    NichechainError
+        If ``size`` is out of range.
+
+    Notes
+    -----
+    E = Σ_j 1 − C(m − c_j, U) / C(m, U); Hurlbert (1971), "The nonconcept of species diversity".
+    """
+    check_whole(size=size)
+    observed = as_whole("counts", counts)
+    if observed.ndim != 1 or (observed < 0).any():
+        raise NichechainError("counts must be one number per state, none of them negative")
+    total = int(observed.sum())
+    if not 1 <= size <= total:
+        raise NichechainError(f"size is {size}, but must be between 1 and the {total} offspring observed")
+    niches = observed[: _counted(counted, observed.size)]
+    others = total - niches[niches > 0]
+    possible = others[others >= size].astype(np.float64)
+    log_missed = (
+        gammaln(possible + 1) - gammaln(possible - size + 1) - gammaln(total + 1) + gammaln(total - size + 1)
+    )
+    return float(others.size - np.exp(log_missed).sum())
+
+
+def check_lengths(generations: int, lineages: int) -> None:
+    """Refuse a lineage without generations, none at all, and parts of one."""
+    check_whole(l=generations, lineages=lineages)
+    if generations < 1:
+        raise NichechainError(f"l is {generations}, but a lineage has at least 1 generation")
+    if lineages < 1:
+        raise NichechainError(f"lineages is {lineages}, but at least 1 is needed")
+
+
+def _sizes(lineages: ArrayLike) -> Ints:
+    """Numbers of lineages, (k,); a single one must be whole by its type, as l must."""
+    if np.ndim(lineages) == 0:
+        check_whole(lineages=lineages)
+    sizes = np.atleast_1d(as_whole("lineages", lineages))
+    if sizes.ndim != 1 or not sizes.size:
+        raise NichechainError(f"lineages has shape {sizes.shape}, but must be one or more numbers")
+    return sizes
+
+
+def _counted(counted: int | None, states: int) -> int:
+    """How many of the first states are niches that count."""
+    if counted is None:
+        return states
+    check_whole(counted=counted)
+    if not 0 <= counted <= states:
+        raise NichechainError(f"counted is {counted}, but must be from 0 to the number of states, {states}")
+    return counted
+
+
+def _faster(transition: LinearMap) -> LinearMap:
+    """The matrix in the form that multiplies faster."""
+    if sparse.issparse(transition) and transition.nnz > _DENSE * transition.shape[0] ** 2:  # type: ignore[attr-defined]
+        dense: Floats = transition.toarray()  # type: ignore[attr-defined]
+        return dense
+    return transition
+
+
+def _at_least_once(probability: Floats, trials: int) -> Floats:
+    """P(an event of this probability happens in at least one of the trials)."""
+    # log1p and expm1 keep the digits of a tiny probability, which 1 - (1 - h)**U rounds away.
+    with np.errstate(divide="ignore"):
+        some: Floats = -np.expm1(trials * np.log1p(-np.minimum(probability, 1.0)))
+    return some

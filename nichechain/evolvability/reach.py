@@ -1,0 +1,218 @@
+"""Which niches descendants of one root reach: a map behind the number that is l-evolvability."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import get_args
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike, NDArray
+from scipy import sparse
+
+from nichechain.chain.model import NicheChain, Transition
+from nichechain.chain.operator import PooledTransition
+from nichechain.core.checks import check_whole
+from nichechain.core.errors import NichechainError
+from nichechain.evolvability import DRAWS, Convention
+from nichechain.evolvability.coverage import check_lengths, visit_probabilities
+from nichechain.evolvability.returns import return_probabilities
+from nichechain.evolvability.roots import Root, generations, transition_draws
+from nichechain.niches import Niche
+
+Floats = NDArray[np.float64]
+
+# Share of possible transitions from which on walks of a few steps see most states.
+_DENSE = 0.05
+
+
+@dataclass(frozen=True)
+class Reach:
+    """Niches that lineages of one root visit, as (n_niches,) arrays.
+
+    Parameters
+    ----------
+    visit : (n,) float64 array
+        h_j, the probability that one lineage visits niche j.
+    at_least_one : (n,) float64 array
+        Probability that at least one of the U lineages does; they sum to the l-evolvability.
+    expected_visits : (n,) float64 array
+        Descendants in niche j in expectation, of all U lineages.
+    low, high : (n,) float64 arrays
+        5 % and 95 % quantiles of ``at_least_one`` over posterior draws of T; equal to it where T
+        is given.
+    l, lineages : int
+        Generations, and number U of lineages.
+    convention, estimator : str
+        What was counted, where T came from.
+    births : int, optional
+        Births behind the root's row of T; None where T is given or the root has no row.
+    """
+
+    visit: Floats
+    at_least_one: Floats
+    expected_visits: Floats
+    low: Floats
+    high: Floats
+    l: int  # noqa: E741  # the paper's name
+    lineages: int
+    convention: str
+    estimator: str
+    births: int | None
+
+    @property
+    def evolvability(self) -> float:
+        """Expected number of niches visited: l-evolvability."""
+        return float(self.at_least_one.sum())
+
+    def to_frame(self, chain: NicheChain) -> pd.DataFrame:
+        """One row per niche, with its label, the surest first."""
+        frame = pd.DataFrame(
+            {
+                "niche": np.arange(self.visit.size),
+                "index": [chain.label(niche) for niche in range(self.visit.size)],
+                "visit": self.visit,
+                "at_least_one": self.at_least_one,
+                "low": self.low,
+                "high": self.high,
+                "expected_visits": self.expected_visits,
+            }
+        )
+        return frame.sort_values("at_least_one", ascending=False, kind="stable").reset_index(drop=True)
+
+
+def reach(
+    chain: NicheChain,
+    *,
+    niche: Niche | None = None,
+    offspring: ArrayLike | None = None,
+    l: int = 5,  # noqa: E741
+    lineages: int = 100,
+    convention: Convention = "definition",
+    draws: int = DRAWS,
+    seed: int = 0,
+) -> Reach:
+    """Niches that descendants of a root reach, and how surely.
+
+    Parameters
+    ----------
+    chain : NicheChain
+    niche : int or tuple of int, optional
+        The root stands in this niche; generation 1 is drawn from its row of T.
+    offspring : (n_niches,) or (S,) array, optional
+        D: generation 1 is drawn from this distribution. Give either this or ``niche``.
+    l : int
+        Generations, at least 1.
+    lineages : int
+        Number U of independent lineages, at least 1: l·U descendants.
+    convention : {"definition", "procedure"}
+        Whether the root's own state counts, as in :func:`nichechain.l_evolvability`.
+    draws : int
+        Posterior draws of T that all figures are averaged over, where it is estimated.
+    seed : int
+        Of the draws, the same ones as those of :func:`nichechain.l_evolvability`.
+
+    Returns
+    -------
+    Reach
+
+    Raises
+    ------
+    NichechainError
+        If an argument is out of range, or not exactly one root is given.
+
+    Notes
+    -----
+    The niches that the paper's section "Towards better evolvability definitions" counts.
+    """
+    check_lengths(l, lineages)
+    check_draws(convention, draws)
+    root = Root(chain, niche=niche, offspring=offspring)
+    n = chain.n_niches
+    visits, descendants, some = [], [], []
+    for transition in transition_draws(chain, draws, seed):
+        visit, passes = visit_probability(
+            transition, root.first(transition, convention), generations(l, convention)
+        )
+        visits.append(visit[:n])
+        descendants.append(lineages * passes[:n])
+        with np.errstate(divide="ignore"):
+            # The digits of a tiny probability would be lost in 1 − (1 − h)^U.
+            some.append(-np.expm1(lineages * np.log1p(-visit[:n])))
+    low, high = np.quantile(some, (0.05, 0.95), axis=0)
+    births = chain.births
+    return Reach(
+        np.mean(visits, axis=0),
+        np.mean(some, axis=0),
+        np.mean(descendants, axis=0),
+        low,
+        high,
+        l,
+        lineages,
+        convention,
+        chain.estimator,
+        None if root.state is None or births is None else int(births[root.state]),
+    )
+
+
+def visit_probability(transition: Transition, first: Floats, steps: int) -> tuple[Floats, Floats]:
+    """Probability that a walk visits each state, and how often it does in expectation.
+
+    Parameters
+    ----------
+    transition : (S, S) row-stochastic matrix
+    first : (S,) array
+        Distribution of the first state of the walk.
+    steps : int
+        States of the walk, the first one included, at least 1.
+
+    Returns
+    -------
+    (S,) float64 array and (S,) float64 array
+        h and the expected numbers of visits.
+
+    Notes
+    -----
+    By the renewal equation (Feller 1968, chapter XIII): the walk is in j at step k with
+    probability p_k = Σ_i f_i r_{k−i}, where f_i is the probability that step i is its first visit
+    and r_m that of a return after m steps. Only the returns need walks of their own: from the
+    states that are reached, and only for as many steps as are left by then. In a matrix that is
+    not sparse they soon see all others; the recursion over all roots is faster there.
+    """
+    rows: sparse.csr_array | PooledTransition
+    if isinstance(transition, PooledTransition):
+        rows, dense = transition, True
+    else:
+        rows = sparse.csr_array(transition)
+        dense = rows.nnz > _DENSE * first.size**2
+    present = np.zeros((steps, first.size))
+    present[0] = first
+    for k in range(1, steps):
+        present[k] = present[k - 1] @ rows
+    passes = present.sum(axis=0)
+    if dense:
+        blocks = [h for _, h in visit_probabilities(transition, first[None, :], steps)]
+        return np.minimum(np.hstack(blocks)[0], 1.0), passes
+    reached = present > 0.0
+    arrival = np.where(reached.any(axis=0), np.argmax(reached, axis=0), steps)
+    new = present.copy()
+    # States first reached in the last step cannot be returned to.
+    again = np.flatnonzero(arrival < steps - 1)
+    if again.size:
+        # Some state is occupied at once, so the longest return wanted is as long as the walk.
+        returns = return_probabilities(rows, again, steps - 1 - arrival[again])
+        for k in range(1, steps):
+            earlier = new[:k, again] * returns[k - 1 :: -1]
+            new[k, again] = np.maximum(present[k, again] - earlier.sum(axis=0), 0.0)
+    return np.clip(new.sum(axis=0), 0.0, 1.0), passes
+
+
+def check_draws(convention: str, draws: int) -> None:
+    """Refuse an unknown convention, or no draws at all."""
+    if convention not in get_args(Convention):
+        raise NichechainError(
+            f"convention is {convention!r}, but must be one of {', '.join(get_args(Convention))}"
+        )
+    check_whole(draws=draws)
+    if draws < 1:
+        raise NichechainError(f"draws is {draws}, but at least 1 is needed")

@@ -1,0 +1,172 @@
+"""What a build is asked to do: one dataclass, which is its command line and stays with its result."""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Mapping
+from dataclasses import MISSING, asdict, dataclass, field, fields
+from typing import Any, Literal, get_args
+
+from nichechain.core.checks import DomainOption, as_bounds, as_shape, check_numbers, plain_options
+from nichechain.core.errors import NichechainError
+from nichechain.variation.additive import StepBound
+
+Replacement = Literal["random", "first", "newest", "objective"]
+Outside = Literal["state", "absorb", "clip"]
+NichesKind = Literal["grid", "cvt"]
+MutationName = Literal["cauchy", "gaussian", "student-t", "uniform-ball"]
+Selection = Literal["uniform", "curiosity"]
+
+MOST_FAILED = 0.5
+"""Share of births that may fail before a run is stopped, unless told otherwise."""
+
+
+@dataclass(frozen=True)
+class BuildConfig:
+    """A MAP-Elites build ("Variation operator"; step 3 of the estimation of l-evolvability).
+
+    Parameters
+    ----------
+    domain : str
+        Name of the domain.
+    domain_seed : int
+        Seed of what the domain holds fixed, such as the block's place.
+    evaluations : int
+        Births in total, the initial ones among them.
+    shape : tuple of int
+        Cells of the grid along each axis of behavior; of a tessellation, its one number of niches.
+    bounds : tuple of (float, float)
+        Bounds of the niches along each axis, in units of behavior.
+    outside : {"state", "absorb", "clip"}
+        What a behavior out of bounds belongs to, see :class:`nichechain.niches.GridNiches`.
+    initial : int
+        Births without a parent.
+    batch : int
+        Children of a step; their parents are drawn from the elites before it.
+    mutation : {"cauchy", "gaussian", "student-t", "uniform-ball"}
+        Mutation operator.
+    scale : float
+        Its scale.
+    replacement : {"random", "first", "newest", "objective"}
+        Which of the births of a niche is its elite: each alike, the first, the last, or the one
+        with the largest objective.
+    seed : int
+        Seed of the run.
+    niches : {"grid", "cvt"}
+        Equal cells, or a Voronoi tessellation, see :class:`nichechain.niches.CVTNiches`.
+    niches_seed : int
+        Seed of a tessellation, apart from that of the run, so that runs can share their niches.
+    domain_options : mapping of str to str, int, float or bool
+        What else :func:`nichechain.domains.make` is told of the domain.
+    df : float, optional
+        Degrees of freedom of student-t, by default 3.
+    step_bound : ({"per-coordinate", "rescaled"}, float), optional
+        Makes N(θ) a bounded set, see :class:`nichechain.variation.Bound`.
+    layer_scales : tuple of float
+        Factor on the scale in each layer of the controller; by default all weights are alike.
+    self_adaptive : bool
+        Whether step sizes are genes, which mutate too and are used before the weights: one per
+        layer that has a layer scale, or else one for all weights. They begin at the scale.
+    selection : {"uniform", "curiosity"}
+        How parents are drawn from the elites: each alike, or in proportion to the curiosity score,
+        see :mod:`nichechain.search.parents`.
+
+    Raises
+    ------
+    NichechainError
+        If a value is out of range.
+    """
+
+    domain: str
+    shape: tuple[int, ...]
+    bounds: tuple[tuple[float, float], ...]
+    domain_seed: int = 0
+    evaluations: int = 8000
+    outside: Outside = "state"
+    initial: int = 100
+    batch: int = 64
+    mutation: MutationName = "cauchy"
+    scale: float = 1.0
+    replacement: Replacement = "random"
+    seed: int = 0
+    niches: NichesKind = "grid"
+    niches_seed: int = 0
+    domain_options: Mapping[str, DomainOption] = field(default_factory=dict, hash=False)
+    df: float | None = None
+    step_bound: tuple[StepBound, float] | None = None
+    layer_scales: tuple[float, ...] = ()
+    self_adaptive: bool = False
+    selection: Selection = "uniform"
+
+    def __post_init__(self) -> None:
+        for name in ("evaluations", "initial", "batch", "seed", "domain_seed", "niches_seed"):
+            try:
+                # Numbers of NumPy become plain ones, which JSON can hold.
+                object.__setattr__(self, name, operator.index(getattr(self, name)))
+            except TypeError:
+                raise NichechainError(
+                    f"{name} is {getattr(self, name)!r}, but must be a whole number"
+                ) from None
+        object.__setattr__(self, "shape", as_shape(self.shape))
+        object.__setattr__(self, "bounds", as_bounds(self.bounds))
+        check_numbers(scale=self.scale)
+        object.__setattr__(self, "scale", float(self.scale))
+        object.__setattr__(self, "domain_options", plain_options(self.domain_options))
+        for scale in self.layer_scales:
+            check_numbers(layer_scale=scale)
+        object.__setattr__(self, "layer_scales", tuple(float(scale) for scale in self.layer_scales))
+        if self.df is not None:
+            check_numbers(df=self.df)
+            object.__setattr__(self, "df", float(self.df))
+        if self.step_bound is not None:
+            if isinstance(self.step_bound, str) or len(self.step_bound) != 2:
+                raise NichechainError(
+                    f"step_bound is {self.step_bound!r}, but must be a kind and a size, as ('rescaled', 2.0)"
+                )
+            kind, size = self.step_bound
+            check_numbers(step_bound=size)
+            object.__setattr__(self, "step_bound", (kind, float(size)))
+        for name in ("evaluations", "initial", "batch"):
+            if getattr(self, name) < 1:
+                raise NichechainError(f"{name} is {getattr(self, name)}, but must be at least 1")
+        for name in ("seed", "domain_seed", "niches_seed"):
+            if getattr(self, name) < 0:
+                raise NichechainError(f"{name} is {getattr(self, name)}, but must not be negative")
+        if self.replacement not in get_args(Replacement):
+            raise NichechainError(
+                f"replacement is {self.replacement!r}, but must be one of {', '.join(get_args(Replacement))}"
+            )
+        if self.niches not in get_args(NichesKind):
+            raise NichechainError(
+                f"niches is {self.niches!r}, but must be one of {', '.join(get_args(NichesKind))}"
+            )
+        if self.niches == "cvt" and len(self.shape) != 1:
+            raise NichechainError(
+                f"shape is {self.shape}, but a tessellation has one number of niches, such as (400,)"
+            )
+        if self.selection not in get_args(Selection):
+            raise NichechainError(
+                f"selection is {self.selection!r}, but must be one of {', '.join(get_args(Selection))}"
+            )
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain values for JSON."""
+        return asdict(self)
+
+    @classmethod
+    def from_json(cls, values: dict[str, Any]) -> BuildConfig:
+        """The configuration that :meth:`to_json` wrote, now or in an earlier version.
+
+        Raises
+        ------
+        NichechainError
+            If a value is unknown, or one is missing that has no default.
+        """
+        names = {field.name for field in fields(cls)}
+        needed = {field.name for field in fields(cls) if field.default is field.default_factory is MISSING}
+        odd = (set(values) - names) | (needed - set(values))
+        if odd:
+            raise NichechainError(
+                f"the configuration has missing or unknown values: {', '.join(sorted(odd))}"
+            )
+        return cls(**values)

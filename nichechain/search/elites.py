@@ -1,0 +1,172 @@
+"""The elites of a search: *the largest key wins* a niche.
+
+They live in a pyribs archive, and the outside state's beside it. The elites after N births are a function of
+the set of births, in whatever order they came.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nichechain.births.table import Offspring
+from nichechain.core.errors import NichechainError
+from nichechain.domains.base import Domain
+from nichechain.niches import CVTNiches, GridNiches, Niches
+
+
+@dataclass(frozen=True)
+class Elites:
+    """The elites of the occupied states, sorted by state; the outside elite comes last.
+
+    Parameters
+    ----------
+    niche : (K,) int64 array
+    genotype : (K, P) float32 array
+    behavior : (K, B) float64 array
+    objective : (K,) float64 array
+    key : (K,) float64 array
+        What won the niche.
+    uid, depth : (K,) int64 arrays
+    """
+
+    niche: NDArray[np.int64]
+    genotype: NDArray[np.float32]
+    behavior: NDArray[np.float64]
+    objective: NDArray[np.float64]
+    key: NDArray[np.float64]
+    uid: NDArray[np.int64]
+    depth: NDArray[np.int64]
+
+    def __len__(self) -> int:
+        return len(self.niche)
+
+    def __getitem__(self, rows: NDArray[np.bool_] | NDArray[np.int64]) -> Elites:
+        return Elites(*(getattr(self, name)[rows] for name in self.__dataclass_fields__))
+
+    @staticmethod
+    def concatenate(first: Elites, second: Elites) -> Elites:
+        """The rows of both."""
+        names = Elites.__dataclass_fields__
+        return Elites(*(np.concatenate([getattr(first, k), getattr(second, k)]) for k in names))
+
+
+@dataclass(frozen=True)
+class SearchState:
+    """All that a search has to remember between two steps; it has no generator.
+
+    Parameters
+    ----------
+    elites : Elites
+    pending : Offspring
+        The children of the last step that the budget did not reach. They are evaluated first
+        when the search goes on, so that it ends as if it had never stopped.
+    births : int
+        Births so far.
+    step : int
+        The last step begun, 0 for the initial births; -1 before them.
+    """
+
+    elites: Elites
+    pending: Offspring
+    births: int
+    step: int
+
+
+class EliteArchive:
+    """A pyribs archive for the niches, and beside it the elite of the outside state."""
+
+    def __init__(self, domain: Domain, niches: Niches) -> None:
+        self._niches = niches
+        make, cells = _pyribs(niches)
+        self._grid = make(
+            solution_dim=domain.genotype_length,
+            ranges=niches.bounds,
+            **cells,
+            solution_dtype=np.float32,
+            objective_dtype=np.float64,
+            measures_dtype=np.float64,
+            extra_fields={
+                "domain_objective": ((), np.float64),
+                "uid": ((), np.int64),
+                "depth": ((), np.int64),
+            },
+        )
+        self._outside: Elites | None = None
+        self._largest_key = np.full(len(niches) + 1, -np.inf)
+
+    @property
+    def filled(self) -> int:
+        """Niches with an elite; the outside state is not one."""
+        return len(self._grid)
+
+    def add(self, candidates: Elites) -> NDArray[np.bool_]:
+        """Offer births that did not fail; true where one is larger than all before it in its niche.
+
+        pyribs gets only those in the grid: it would put the others in edge cells without a word.
+        """
+        inside = candidates[candidates.niche < len(self._niches)]
+        if len(inside):
+            self._grid.add(
+                inside.genotype,
+                inside.key,
+                inside.behavior,
+                domain_objective=inside.objective,
+                uid=inside.uid,
+                depth=inside.depth,
+            )
+        outside = candidates[candidates.niche == len(self._niches)]
+        if self._outside is not None:
+            outside = Elites.concatenate(self._outside, outside)
+        if len(outside):
+            # argmax takes the first of equals, as pyribs does: the elite that is there stays.
+            self._outside = outside[np.array([np.argmax(outside.key)])]
+        # One by one, so that it does not matter how births are cut into batches.
+        accepted = np.zeros(len(candidates), bool)
+        for i, (niche, key) in enumerate(zip(candidates.niche, candidates.key, strict=True)):
+            if key > self._largest_key[niche]:
+                self._largest_key[niche] = key
+                accepted[i] = True
+        return accepted
+
+    def occupied(self) -> NDArray[np.int64]:
+        """States that have an elite, sorted."""
+        inside = np.sort(self._grid.data("index")).astype(np.int64)
+        return inside if self._outside is None else np.append(inside, len(self._niches))
+
+    def elites(self, state: NDArray[np.int64]) -> Elites:
+        """The elite of each of some occupied states, which may repeat."""
+        inside = np.flatnonzero(state < len(self._niches))
+        _, data = self._grid.retrieve(self._niches.centers[state[inside]])
+        found = Elites(
+            state[inside],
+            data["solution"],
+            data["measures"],
+            data["domain_objective"],
+            data["objective"],
+            data["uid"],
+            data["depth"],
+        )
+        if self._outside is None:
+            return found
+        # Row len(found) stands for the outside elite.
+        rows = np.full(len(state), len(found))
+        rows[inside] = np.arange(len(found))
+        return Elites.concatenate(found, self._outside)[rows]
+
+
+def _pyribs(niches: Niches) -> tuple[Any, dict[str, Any]]:
+    """The class of archive that has such niches, and what it has to be told of them."""
+    # Importing pyribs takes seconds, which only a search should spend.
+    from ribs.archives import CVTArchive, GridArchive
+
+    match niches:
+        case GridNiches():
+            return GridArchive, {"dims": niches.shape}
+        case CVTNiches():
+            return CVTArchive, {"centroids": niches.centroids}
+        case _:
+            raise NichechainError(f"niches are {niches!r}, but pyribs has an archive for grid and cvt only")

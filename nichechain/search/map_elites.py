@@ -1,0 +1,216 @@
+"""MAP-Elites that remembers who was born where, and from which niche.
+
+One step: draw parents from the occupied niches, mutate, evaluate, keep. Elites live in
+a pyribs archive. Which birth of a niche is its elite follows one rule, *the largest key wins*,
+so the elites after N births are a function of the set of births, in whatever order they came.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pyarrow as pa
+from numpy.typing import NDArray
+
+from nichechain import births
+from nichechain.births.table import NONE, Offspring
+from nichechain.core.errors import NichechainError
+from nichechain.core.randomness import Purpose, keyed
+from nichechain.domains.base import Domain, Evaluation
+from nichechain.execution import Executor
+from nichechain.niches import Niches
+from nichechain.search.config import BuildConfig
+from nichechain.search.elites import EliteArchive, Elites, SearchState
+from nichechain.search.parents import CuriosityScores, draw_curious
+from nichechain.search.savings import Savings
+from nichechain.variation import Mutation
+
+
+class MapElites:
+    """The search loop.
+
+    Parameters
+    ----------
+    domain : Domain
+    niches : Niches
+    mutate : Mutation
+    config : BuildConfig
+    state : SearchState, optional
+        Where to go on from; by default from the start.
+    curiosity : CuriosityScores, optional
+        Scores after the births so far, where parents are selected by them and there is a state.
+
+    Attributes
+    ----------
+    births : int
+        Births so far.
+    step : int
+        The last step begun, -1 before the first.
+    savings : Savings
+        How much physics the births so far were spared, as far as they were evaluated here.
+    settled : bool
+        Whether the state is that after a finished batch, not in the middle of keeping one.
+
+    Raises
+    ------
+    NichechainError
+        If a search by curiosity is given a state and no scores.
+    """
+
+    def __init__(
+        self,
+        domain: Domain,
+        niches: Niches,
+        mutate: Mutation,
+        config: BuildConfig,
+        state: SearchState | None = None,
+        curiosity: CuriosityScores | None = None,
+    ) -> None:
+        if config.selection == "curiosity" and state is not None and curiosity is None:
+            raise NichechainError("a search that selects by curiosity goes on from its scores: give them")
+        self._curiosity = curiosity or CuriosityScores()
+        self._domain = domain
+        self._niches = niches
+        self._config = config
+        self._mutate = mutate
+        self._archive = EliteArchive(domain, niches)
+        self._pending = _no_offspring(domain.genotype_length)
+        self.births = 0
+        self.step = -1
+        self.savings = Savings()
+        self.settled = True
+        if state is not None:
+            self._archive.add(state.elites)
+            self._pending = state.pending
+            self.births = state.births
+            self.step = state.step
+
+    @property
+    def state(self) -> SearchState:
+        """The search after its last finished batch."""
+        elites = self._archive.elites(self._archive.occupied())
+        return SearchState(elites, self._pending, self.births, self.step)
+
+    @property
+    def filled(self) -> int:
+        """Niches with an elite; the outside state is not one."""
+        return self._archive.filled
+
+    def advance(
+        self, executor: Executor, limit: int, on_done: Callable[[int], None] | None = None
+    ) -> pa.Table:
+        """Evaluate the children of one step, at most ``limit`` of them.
+
+        Parameters
+        ----------
+        executor : Executor
+        limit : int
+            At least 1. The children beyond it stay pending.
+        on_done : callable, optional
+            Told how many more have been evaluated.
+
+        Returns
+        -------
+        pyarrow.Table
+            Their births.
+
+        Raises
+        ------
+        NichechainError
+            If no birth so far can be a parent.
+        """
+        if len(self._pending):
+            step, waiting = self.step, self._pending
+        else:
+            step = self.step + 1
+            waiting = self._initial() if step == 0 else self._children(step)
+        offspring = waiting[:limit]
+        evaluation = executor.evaluate(self._domain, offspring.genotype, on_done)
+        # Nothing of the search changes before the evaluation is there, so an interrupted one
+        # leaves the last state whole.
+        self.settled = False
+        self._pending = waiting[limit:]
+        self.step = step
+        self.births += len(offspring)
+        self.savings = self.savings.and_of(evaluation)
+        rows = self._keep(offspring, evaluation)
+        self.settled = True
+        return rows
+
+    def _initial(self) -> Offspring:
+        n = self._config.initial
+        genotypes = self._domain.sample(n, seed=keyed(self._config.seed, Purpose.INITIAL))
+        none = np.full(n, NONE, np.int64)
+        return Offspring(genotypes, np.arange(n), none, none, np.zeros(n, np.int64))
+
+    def _children(self, step: int) -> Offspring:
+        occupied = self._archive.occupied()
+        if self._niches.outside == "absorb":
+            occupied = occupied[occupied < len(self._niches)]
+        if not len(occupied):
+            raise NichechainError(
+                f"none of the {self.births} initial births can be a parent: "
+                "widen the bounds, keep outside as a state, or raise the number of initial births"
+            )
+        batch = self._config.batch
+        rng = keyed(self._config.seed, Purpose.SELECTION, step)
+        if self._config.selection == "curiosity":
+            scores = self._curiosity.of(self._archive.elites(occupied).uid)
+            drawn = draw_curious(scores, batch, rng)
+        else:
+            drawn = rng.integers(len(occupied), size=batch)
+        parents = self._archive.elites(occupied[drawn])
+        uid = self._first_uid(step) + np.arange(batch)
+        return Offspring(
+            np.stack([self._child(*pair) for pair in zip(parents.genotype, uid.tolist(), strict=True)]),
+            uid,
+            parents.uid,
+            parents.niche,
+            parents.depth + 1,
+        )
+
+    def _child(self, parent: NDArray[np.float32], uid: int) -> NDArray[np.float32]:
+        return self._mutate(parent, keyed(self._config.seed, Purpose.MUTATION, uid))
+
+    def _first_uid(self, step: int) -> int:
+        return 0 if step == 0 else self._config.initial + (step - 1) * self._config.batch
+
+    def _keep(self, offspring: Offspring, evaluation: Evaluation) -> pa.Table:
+        fine = ~evaluation.failed
+        niche = np.full(len(offspring), NONE, np.int64)
+        niche[fine] = self._niches.of(evaluation.behavior[fine])
+        candidates = Elites(
+            niche,
+            offspring.genotype,
+            evaluation.behavior,
+            evaluation.objective,
+            self._keys(offspring.uid, evaluation.objective),
+            offspring.uid,
+            offspring.depth,
+        )
+        accepted = np.zeros(len(offspring), bool)
+        accepted[fine] = self._archive.add(candidates[fine])
+        if self._config.selection == "curiosity":
+            self._curiosity.tell(offspring.parent_uid, accepted)
+        return births.table(offspring, evaluation, child_niche=niche, accepted=accepted, step=self.step)
+
+    def _keys(self, uid: NDArray[np.int64], objective: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The key of each birth; the largest of a niche makes its elite."""
+        match self._config.replacement:
+            case "random":
+                # One uniform key each: the elite is a uniform sample of its niche's births.
+                size = self._config.initial if self.step == 0 else self._config.batch
+                keys = keyed(self._config.seed, Purpose.REPLACEMENT, self.step).random(size)
+                return keys[uid - self._first_uid(self.step)]
+            case "first":
+                return -uid.astype(np.float64)
+            case "newest":
+                return uid.astype(np.float64)
+            case "objective":
+                return objective
+
+
+def _no_offspring(length: int) -> Offspring:
+    none = np.empty(0, np.int64)
+    return Offspring(np.empty((0, length), np.float32), none, none, none, none)

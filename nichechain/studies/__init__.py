@@ -1,0 +1,36 @@
+"""Experiments on walks: what pressure and diversity metric do to evolvability, run, tested and reported."""
+
+from __future__ import annotations
+
+from nichechain.studies.conditions import Condition, condition_seed, pressure_of, selection_of
+from nichechain.studies.initialisation import initialise
+from nichechain.studies.running import is_study, read_births, read_records, read_study, run
+from nichechain.studies.study import (
+    LEVELS,
+    METRICS,
+    VARIATIONS,
+    Study,
+    metric_conditions,
+    pressure_conditions,
+    variations,
+)
+
+__all__ = [
+    "LEVELS",
+    "METRICS",
+    "VARIATIONS",
+    "Condition",
+    "Study",
+    "condition_seed",
+    "initialise",
+    "is_study",
+    "metric_conditions",
+    "pressure_conditions",
+    "pressure_of",
+    "read_births",
+    "read_records",
+    "read_study",
+    "run",
+    "selection_of",
+    "variations",
+]

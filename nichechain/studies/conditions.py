@@ -1,0 +1,180 @@
+"""A condition: one kind of walk, in plain values that a file and a table can hold."""
+
+from __future__ import annotations
+
+import re
+import zlib
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+from nichechain import variation
+from nichechain.core.errors import NichechainError
+from nichechain.core.randomness import Purpose, keyed
+from nichechain.studies.initialisation import check_scheme
+from nichechain.variation import Mutation
+from nichechain.variation.parsing import parse_step_bound
+from nichechain.walks import (
+    BetterThanParent,
+    Selection,
+    Selective,
+    TopFraction,
+    Uniform,
+    WalkConfig,
+    diversity,
+)
+from nichechain.walks.diversity import ArchiveRule, Metric
+
+MetricName = Literal["knn", "knn-no-archive", "parent", "ancestors", "kde"]
+Mode = Literal["factor", "length"]
+
+
+@dataclass(frozen=True)
+class Condition:
+    """One kind of walk; every default is the paper's ("Hyperparameters").
+
+    Parameters
+    ----------
+    label : str
+        Name in tables and figures, unique within a study.
+    level : str
+        Evolutionary pressure: ``selective``, ``better`` (than the parent), a fraction such as
+        ``0.25`` (the best quarter), or ``random``.
+    metric : {"knn", "knn-no-archive", "parent", "ancestors", "kde"}
+        Diversity G.
+    offspring : int
+        Children of a state in each step.
+    mutation : str
+        Mutation operator.
+    scale : float
+        Its scale.
+    step_bound : str, optional
+        Bound of a mutation's step, such as ``per-coordinate:2`` or ``rescaled:50``, that makes N(θ)
+        a bounded set, see :class:`nichechain.variation.Bound`.
+    k : int
+        Neighbours of the kNN metrics.
+    bandwidth : float
+        Smoothing parameter of the KDE metric.
+    mode : {"factor", "length"}
+        What that parameter multiplies, see :class:`nichechain.walks.diversity.KernelDensity`.
+    decay : float
+        Discount g of the KDE metric by age, γ = g^age.
+    archive_limit : int
+        Behaviors that the novelty archive holds at most.
+    archive_scope : {"walk", "configuration"}
+        Whether each walk has a novelty archive of its own or all of the condition share one.
+    other_niche : bool
+        The niche variant: only a child in another niche than its parent may follow.
+    initialisation : str
+        How the first genotype is made, see :mod:`nichechain.studies.initialisation`.
+
+    Raises
+    ------
+    NichechainError
+        If a value is out of range.
+    """
+
+    label: str
+    level: str = "selective"
+    metric: MetricName = "knn"
+    offspring: int = 30
+    mutation: str = "cauchy"
+    scale: float = 1.0
+    k: int = 15
+    bandwidth: float = 0.5
+    mode: Mode = "factor"
+    decay: float = 1.0
+    archive_limit: int = 1200
+    archive_scope: Literal["walk", "configuration"] = "walk"
+    step_bound: str | None = None
+    other_niche: bool = False
+    initialisation: str = "domain"
+
+    def __post_init__(self) -> None:
+        if self.metric not in get_args(MetricName):
+            raise NichechainError(
+                f"metric is {self.metric!r}, but must be one of {', '.join(get_args(MetricName))}"
+            )
+        if self.mode not in get_args(Mode):
+            raise NichechainError(f"mode is {self.mode!r}, but must be one of {', '.join(get_args(Mode))}")
+        if not self.slug:
+            raise NichechainError(f"label is {self.label!r}, but must have a letter or a digit")
+        check_scheme(self.initialisation)
+        self.walk_config(0)
+        self.mutate()
+
+    @property
+    def slug(self) -> str:
+        """The label as a name for files."""
+        return re.sub(r"[^A-Za-z0-9.]+", "-", self.label).strip("-")
+
+    def walk_config(self, seed: int) -> WalkConfig:
+        """The kind of walk, its runs seeded by the study's seed and the condition's label."""
+        return WalkConfig(
+            selection=selection_of(self.level),
+            metric=self._metric(),
+            offspring=self.offspring,
+            other_niche=self.other_niche,
+            archive=ArchiveRule(limit=self.archive_limit, scope=self.archive_scope),
+            seed=condition_seed(seed, self.label),
+        )
+
+    def mutate(self) -> Mutation:
+        """The mutation operator."""
+        bound = None
+        if self.step_bound is not None:
+            bound = variation.Bound(*parse_step_bound(self.step_bound))
+        return variation.make(self.mutation, self.scale, bound=bound)
+
+    def _metric(self) -> Metric:
+        if self.metric in ("knn", "knn-no-archive"):
+            return diversity.KNearest(self.k, archive=self.metric == "knn")
+        if self.metric == "kde":
+            return diversity.KernelDensity(self.bandwidth, self.mode, self.decay)
+        return diversity.make(self.metric)
+
+
+def selection_of(level: str) -> Selection:
+    """The selection of a level of evolutionary pressure.
+
+    Raises
+    ------
+    NichechainError
+        If there is no such level.
+    """
+    named: dict[str, Selection] = {
+        "selective": Selective(),
+        "better": BetterThanParent(),
+        "random": Uniform(),
+    }
+    if level in named:
+        return named[level]
+    try:
+        fraction = float(level)
+    except (TypeError, ValueError):
+        raise NichechainError(
+            f"level is {level!r}, but must be selective, better, random, or a fraction above 0 and at most 1"
+        ) from None
+    return TopFraction(fraction)
+
+
+def pressure_of(level: str) -> float:
+    """Share of the offspring that a level lets pass, 0 for the selective walk and 1 for the random.
+
+    Raises
+    ------
+    NichechainError
+        If the level is ``better``, which lets pass a share that changes, or is none.
+    """
+    if level == "selective":
+        return 0.0
+    if level == "random":
+        return 1.0
+    rule = selection_of(level)
+    if isinstance(rule, TopFraction):
+        return rule.fraction
+    raise NichechainError(f"level is {level!r}, which lets no fixed share of the offspring pass")
+
+
+def condition_seed(seed: int, label: str) -> int:
+    """Seed of a condition's runs: it depends on its label, not on the conditions beside it."""
+    return int(keyed(seed, Purpose.CONDITION, zlib.crc32(label.encode())).integers(2**63))

@@ -1,0 +1,267 @@
+"""Whether one archive's niches are more evolvable than another's, with runs or elites as the sample."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass, replace
+
+import numpy as np
+import pandas as pd
+import pyarrow as pa
+from numpy.typing import NDArray
+from scipy import stats
+
+from nichechain.births.table import NONE, check_columns
+from nichechain.chain.base_measure import BaseMeasure
+from nichechain.chain.counts import TransitionCounts
+from nichechain.chain.empirical_bayes import design_effect, most_likely
+from nichechain.chain.posterior import DirichletPosterior
+from nichechain.core.checks import check_whole
+from nichechain.core.errors import NichechainError
+from nichechain.core.randomness import Purpose, keyed
+from nichechain.evolvability.coverage import check_lengths, expected_coverage, rarefied_coverage
+from nichechain.niches import Niches
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+_LEVEL = 0.9
+# Draws of T for the values themselves, which cost nothing beside the resamples.
+_VALUE_DRAWS = 50
+
+
+@dataclass(frozen=True)
+class Difference:
+    """One figure of two archives.
+
+    Parameters
+    ----------
+    figure : str
+    first, second : float
+        Its values, in niches.
+    difference : float
+        Second − first.
+    standard_error : float
+        Of the difference, by resampling.
+    low, high : float
+        90 % interval of the difference.
+    """
+
+    figure: str
+    first: float
+    second: float
+    difference: float
+    standard_error: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class Contrast:
+    """Two archives of equal niches, figure by figure.
+
+    Parameters
+    ----------
+    rows : tuple of Difference
+        ``evolvability``: niches that U lineages reach, ``reach``: niches that one lineage does,
+        both as means over the niches compared; ``coverage``: niches filled by as many births as
+        the smaller archive has.
+    niches : int
+        Niches compared: those with ``min_births`` births behind their row in both archives.
+    clusters : tuple of (str, int)
+        Of each archive what was resampled, ``runs`` or ``elites``, and how many there are.
+    births : int
+        Births at which coverage is compared.
+    l, lineages, min_births, resamples : int
+    """
+
+    rows: tuple[Difference, ...]
+    niches: int
+    clusters: tuple[tuple[str, int], tuple[str, int]]
+    births: int
+    l: int  # noqa: E741  # the paper's name
+    lineages: int
+    min_births: int
+    resamples: int
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row per figure, with the fields of :class:`Difference`."""
+        return pd.DataFrame([asdict(row) for row in self.rows])
+
+
+def contrast(
+    first: pa.Table,
+    second: pa.Table,
+    niches: Niches,
+    *,
+    l: int = 5,  # noqa: E741
+    lineages: int = 100,
+    min_births: int = 20,
+    resamples: int = 100,
+    draws: int = 4,
+    seed: int = 0,
+) -> Contrast:
+    """Compare the births of two archives.
+
+    Parameters
+    ----------
+    first, second : pyarrow.Table
+        Columns of :mod:`nichechain.births.table`.
+    niches : Niches
+        The niches of both.
+    l, lineages : int
+        Generations and number U of lineages.
+    min_births : int
+        Niches with fewer births behind their row, in either archive, are left out of evolvability
+        and reach.
+    resamples : int
+        Resamples of the births of either archive, at least 2.
+    draws : int
+        Posterior draws of T for each resample.
+    seed : int
+        Of resamples and draws.
+
+    Returns
+    -------
+    Contrast
+
+    Raises
+    ------
+    NichechainError
+        If an argument is out of range or no niche can be compared.
+
+    Notes
+    -----
+    Where an archive has several runs, whole runs are drawn with replacement; where it has one,
+    its elites are, with all their children: then the interval tells what other elites of this
+    run would have changed, not what another run would. The prior keeps the strength and mixture
+    that all births gave. Resamples hold fewer different births than a real sample, which lowers
+    every figure, so only their spread is used: the interval is the difference ± its standard error
+    times Student's quantile, and for few runs r the spread is corrected by √(r/(r − 1)).
+    """
+    check_lengths(l, lineages)
+    check_whole(resamples=resamples, draws=draws, min_births=min_births)
+    for name, number, least in (
+        ("resamples", resamples, 2),
+        ("draws", draws, 1),
+        ("min_births", min_births, 0),
+    ):
+        if number < least:
+            raise NichechainError(f"{name} is {number}, but must be at least {least}")
+    sides = _Side.of(first, niches), _Side.of(second, niches)
+    whole = [side.counts() for side in sides]
+    enough = [counts.births[: len(niches)] >= max(1, min_births) for counts in whole]
+    compared = np.flatnonzero(enough[0] & enough[1])
+    if not compared.size:
+        raise NichechainError(
+            f"no niche has {min_births} births behind its row of T in both archives: lower min_births"
+        )
+    size = min(int(counts.visits.sum()) for counts in whole)
+    values, spreads, freedom = [], [], []
+    for number, (side, counts) in enumerate(zip(sides, whole, strict=True)):
+        effect = design_effect(counts)
+        strength, weights = most_likely(counts, effect)
+
+        def figures(counts: TransitionCounts, draws: int, rng: np.random.Generator) -> Floats:
+            base = BaseMeasure.pooled(counts, weights)  # noqa: B023  # called in this round only
+            posterior = DirichletPosterior(counts, base, strength, effect)  # noqa: B023
+            lineages_of = [lineages, 1]
+            found = np.zeros(2)
+            for _ in range(draws):
+                T = posterior.draw(rng)
+                covered = expected_coverage(T, T[compared], l, lineages_of, counted=len(niches))
+                found += covered.mean(axis=0) / draws
+            visits = counts.visits
+            return np.append(
+                found, rarefied_coverage(visits, min(size, int(visits.sum())), counted=len(niches))
+            )
+
+        # Both are drawn alike, so that archives of the same births do not differ.
+        values.append(figures(counts, _VALUE_DRAWS, keyed(seed, Purpose.POSTERIOR)))
+        again = [
+            figures(side.counts(multiplicity), draws, rng)
+            for multiplicity, rng in side.resampled(resamples, seed, number)
+        ]
+        correction = side.clusters / max(1, side.clusters - 1)
+        spreads.append(np.var(again, axis=0, ddof=1) * correction)
+        freedom.append(side.clusters - 1)
+    difference = values[1] - values[0]
+    error = np.sqrt(spreads[0] + spreads[1])
+    quantile = float(stats.t.ppf(0.5 + _LEVEL / 2, max(1, min(freedom))))
+    rows = tuple(
+        Difference(
+            name, float(a), float(b), float(d), float(e), float(d - quantile * e), float(d + quantile * e)
+        )
+        for name, a, b, d, e in zip(
+            ("evolvability", "reach", "coverage"), *values, difference, error, strict=True
+        )
+    )
+    clusters = (sides[0].kind, sides[0].clusters), (sides[1].kind, sides[1].clusters)
+    return Contrast(rows, compared.size, clusters, size, l, lineages, min_births, resamples)
+
+
+@dataclass(frozen=True)
+class _Side:
+    """Births of one archive, in clusters that are drawn together.
+
+    Parameters
+    ----------
+    niches : Niches
+    parent, child, elite, cluster : (N,) int64 arrays
+        Births that did not fail; ``NONE`` for a null parent, and for the cluster of a birth that
+        is in every resample.
+    kind : {"runs", "elites"}
+    clusters : int
+    """
+
+    niches: Niches
+    parent: Ints
+    child: Ints
+    elite: Ints
+    cluster: Ints
+    kind: str
+    clusters: int
+
+    @classmethod
+    def of(cls, births: pa.Table, niches: Niches) -> _Side:
+        check_columns(births, "run", "parent_uid", "parent_niche", "child_niche")
+        parent, child, uid, run = (
+            births[name].fill_null(NONE).to_numpy().astype(np.int64)
+            for name in ("parent_niche", "child_niche", "parent_uid", "run")
+        )
+        parent, child, uid, run = (column[child != NONE] for column in (parent, child, uid, run))
+        span = 1 + uid.max(initial=0)
+        # A birth of a parent that is not known is a cluster, and an elite, of its own.
+        lonely = span * (1 + run.max(initial=0)) + np.arange(uid.size)
+        elite = np.where(uid == NONE, lonely, run * span + uid)
+        names, by_run = np.unique(run, return_inverse=True)
+        if names.size > 1:
+            return cls(niches, parent, child, elite, by_run.ravel().astype(np.int64), "runs", names.size)
+        cluster = np.full(parent.size, NONE, np.int64)
+        moved = parent != NONE
+        owners, number = np.unique(elite[moved], return_inverse=True)
+        cluster[moved] = number.ravel()
+        return cls(niches, parent, child, elite, cluster, "elites", owners.size)
+
+    def counts(self, multiplicity: Ints | None = None) -> TransitionCounts:
+        """Counts of all births, or of each cluster so many times (clusters,)."""
+        n = np.ones(self.parent.size, np.int64)
+        if multiplicity is not None:
+            # Initial births of a single run are nobody's children, and stay.
+            n = np.where(self.cluster == NONE, 1, multiplicity[self.cluster])
+        moved = self.parent != NONE
+        if multiplicity is None:
+            counts = TransitionCounts.from_births(self.parent, self.child, self.niches, elite=self.elite)
+        else:
+            counts = TransitionCounts.from_pairs(self.parent[moved], self.child[moved], self.niches, n[moved])
+        # The counts have been made, so every child's state is one of these niches.
+        visits = np.zeros(self.niches.states, np.int64)
+        np.add.at(visits, self.child, n)
+        return replace(counts, visits=visits)
+
+    def resampled(self, resamples: int, seed: int, side: int) -> Iterator[tuple[Ints, np.random.Generator]]:
+        """How often each cluster was drawn, and a generator for what follows."""
+        for number in range(resamples):
+            rng = keyed(seed, Purpose.RESAMPLING, 2 * number + side)
+            drawn = rng.integers(self.clusters, size=self.clusters)
+            yield np.bincount(drawn, minlength=self.clusters), rng

@@ -1,0 +1,63 @@
+"""Diversity metrics G of behaviors, and the archive of behaviors they remember.
+
+A metric scores the behaviors of many walks at once; larger means more diverse.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from nichechain.core.errors import NichechainError
+from nichechain.walks.diversity.kernel import KernelDensity, kernel_density
+from nichechain.walks.diversity.metrics import (
+    AncestorDistance,
+    KNearest,
+    Metric,
+    ParentDistance,
+    Surroundings,
+    ancestor_distance,
+    knn_distance,
+    parent_distance,
+)
+from nichechain.walks.diversity.novelty import ArchiveRule, NoveltyArchive
+
+__all__ = [
+    "AncestorDistance",
+    "ArchiveRule",
+    "KNearest",
+    "KernelDensity",
+    "Metric",
+    "NoveltyArchive",
+    "ParentDistance",
+    "Surroundings",
+    "ancestor_distance",
+    "kernel_density",
+    "knn_distance",
+    "make",
+    "parent_distance",
+]
+
+_METRICS: dict[str, Callable[[], Metric]] = {
+    "knn": KNearest,
+    "knn-no-archive": lambda: KNearest(archive=False),
+    "parent": ParentDistance,
+    "ancestors": AncestorDistance,
+    "kde": KernelDensity,
+}
+
+
+def make(name: str) -> Metric:
+    """The metric of that name with the paper's parameters.
+
+    Parameters
+    ----------
+    name : {"knn", "knn-no-archive", "parent", "ancestors", "kde"}
+
+    Raises
+    ------
+    NichechainError
+        If there is none.
+    """
+    if name not in _METRICS:
+        raise NichechainError(f"metric is {name!r}, but must be one of {', '.join(_METRICS)}")
+    return _METRICS[name]()

@@ -1,0 +1,151 @@
+"""Logs of other searches as archives."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import nichechain as nc
+from nichechain.archive.imported import Axes, Columns, import_births
+from nichechain.core.errors import ArchiveError, NichechainError
+
+GRID = nc.GridNiches((4, 3), ((-1.0, 1.0), (-1.0, 1.0)))
+NATIVE = Columns(run="run", uid="uid", elite="parent_uid", step="step")
+
+
+@pytest.fixture(scope="module")
+def arm(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("importing") / "arm"
+    config = nc.BuildConfig("arm", GRID.shape, GRID.bounds, evaluations=400, initial=50, batch=25, scale=0.5)
+    with nc.Threads(1) as threads:
+        nc.build(config, folder, threads)
+    return nc.load(folder)
+
+
+def written(frame, path):
+    frame.to_csv(path, index=False) if path.suffix == ".csv" else frame.to_parquet(path)
+    return path
+
+
+@pytest.mark.parametrize("kind", [".csv", ".parquet"])
+def test_an_archive_survives_its_own_log(arm, tmp_path, kind):
+    log = written(arm.births(), tmp_path / f"log{kind}")
+    import_births(log, tmp_path / "in", GRID, columns=NATIVE)
+    archive = nc.load(tmp_path / "in")
+    np.testing.assert_array_equal(archive.counts.matrix.toarray(), arm.counts.matrix.toarray())
+    np.testing.assert_array_equal(archive.counts.visits, arm.counts.visits)
+    np.testing.assert_array_equal(archive.counts.families, arm.counts.families)
+    np.testing.assert_array_equal(archive.counts_of(steps=(1, 3)).visits, arm.counts_of(steps=(1, 3)).visits)
+    assert archive.chain().estimator == arm.chain().estimator
+    frame, native = archive.births(), arm.births()
+    for name in ("run", "uid", "parent_uid", "parent_niche", "child_niche", "step", "failed"):
+        assert frame[name].equals(native[name]), name
+    assert frame[["depth", "objective", "accepted", "behavior_axis_0"]].isna().all(axis=None)
+
+
+def test_behavior_in_place_of_niches(arm, tmp_path):
+    births = arm.births()
+    parents = births.set_index("uid").reindex(births["parent_uid"])
+    frame = pd.DataFrame(
+        {
+            "px": parents["behavior_x"].to_numpy(),
+            "py": parents["behavior_y"].to_numpy(),
+            "x": births["behavior_x"],
+            "y": births["behavior_y"],
+        }
+    )
+    frame.loc[7, "x"] = np.nan
+    log = written(frame, tmp_path / "log.parquet")
+    import_births(log, tmp_path / "in", GRID, columns=Columns(("px", "py"), ("x", "y")), axes=Axes(unit="m"))
+    archive = nc.load(tmp_path / "in")
+    again = archive.births()
+    expected = births["child_niche"].astype(object).where(births.index != 7)
+    assert again["child_niche"].isna()[7]
+    assert again["failed"][7] == "the log has no child"
+    assert again["child_niche"].drop(7).tolist() == expected.drop(7).tolist()
+    assert again["parent_niche"].equals(births["parent_niche"])
+    assert again["behavior_x"].drop(7).tolist() == births["behavior_x"].drop(7).tolist()
+    assert archive.meta.facts.behavior_names == ("x", "y")
+    assert archive.meta.facts.unit == "m"
+    # The log does not say whose children births are.
+    assert len(archive.counts.families) == 0
+
+
+def test_runs_are_told_apart_whatever_they_are_called(tmp_path):
+    frame = pd.DataFrame(
+        {"parent_niche": [0, 0, 0, 1], "child_niche": [1, 2, 3, 12], "seed": ["b", "a", "b", "a"]}
+    )
+    import_births(written(frame, tmp_path / "log.csv"), tmp_path / "in", GRID, columns=Columns(run="seed"))
+    archive = nc.load(tmp_path / "in")
+    births = archive.births()
+    assert births["run"].tolist() == [1, 0, 1, 0]
+    assert births["uid"].tolist() == [0, 0, 1, 1]
+    assert archive.counts.births_outside == 1
+    assert archive.counts_of(run=0).visits.sum() == 2
+
+
+def test_what_an_imported_archive_cannot_do(tmp_path):
+    frame = pd.DataFrame({"parent_niche": [0, 0], "child_niche": [1, 2]})
+    log = written(frame, tmp_path / "log.csv")
+    import_births(log, tmp_path / "in", GRID)
+    archive = nc.load(tmp_path / "in")
+    assert repr(archive) == f"Archive({str(tmp_path / 'in')!r}: 2 imported births)"
+    with pytest.raises(ArchiveError, match="domain is not known"):
+        _ = archive.domain
+    with pytest.raises(ArchiveError, match="operator is not known"):
+        _ = archive.mutate
+    with pytest.raises(ArchiveError, match="births but no elites"):
+        archive.elite(1)
+    with pytest.raises(ArchiveError, match="already holds an archive"):
+        import_births(log, tmp_path / "in", GRID)
+    assert archive.meta.origin["file"] == "log.csv"
+    assert archive.meta.complete
+
+
+GOOD = {"parent_niche": [0, 1, 2], "child_niche": [1, 2, 3]}
+
+
+@pytest.mark.parametrize(
+    ("values", "columns", "said"),
+    [
+        ({}, Columns(parent="from"), "has no column 'from': it has parent_niche, child_niche"),
+        ({"child_niche": [1, 2, 13]}, Columns(), "row 3 has child_niche 13, but states run from 0 to 12"),
+        ({"parent_niche": [0, -2, 2]}, Columns(), "row 2 has parent_niche -2, but must not be negative"),
+        ({"child_niche": [1, 2.5, 3]}, Columns(), "row 2 has child_niche 2.5, but must have a whole number"),
+        ({"child_niche": ["a", "b", "c"]}, Columns(), "column 'child_niche' has values of type"),
+        ({"uid": [1, 1, 2]}, Columns(uid="uid"), "row 2 has uid 1 again"),
+        ({"uid": [1, None, 2]}, Columns(uid="uid"), "row 2 has no uid"),
+        ({"run": ["a", None, "b"]}, Columns(run="run"), "row 2 has no run"),
+        ({"elite": [1, None, 2]}, Columns(elite="elite"), "row 2 has a parent's niche but no elite"),
+        ({"step": [2**40, 0, 0]}, Columns(step="step"), "a number is too large"),
+        ({"x": [0.0, 1.0, 2.0]}, Columns(child=("x",)), "behavior has columns x, but the grid has 2 axes"),
+        ({"x": [0.0, np.inf, 2.0]}, Columns(child=("x", "x")), "row 2 has an infinite behavior"),
+    ],
+)
+def test_bad_logs(tmp_path, values, columns, said):
+    log = written(pd.DataFrame({**GOOD, **values}), tmp_path / "log.parquet")
+    with pytest.raises(NichechainError, match=said) as caught:
+        import_births(log, tmp_path / "in", GRID, columns=columns)
+    assert "\n" not in str(caught.value)
+    assert not (tmp_path / "in").exists()
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "said"),
+    [
+        ("log.txt", b"", "neither a .csv nor a .parquet"),
+        ("log.parquet", b"abc", "cannot be read as PARQUET"),
+        ("log.csv", b"", "cannot be read as CSV"),
+        ("log.csv", b"parent_niche,child_niche\n", "has no rows"),
+        ("log.csv", b"parent_niche,child_niche\n1\n", "cannot be read as CSV"),
+    ],
+)
+def test_files_that_are_no_logs(tmp_path, name, content, said):
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(NichechainError, match=said):
+        import_births(tmp_path / name, tmp_path / "in", GRID)
+
+
+def test_names_of_axes_are_as_many_as_axes(tmp_path):
+    log = written(pd.DataFrame(GOOD), tmp_path / "log.csv")
+    with pytest.raises(NichechainError, match="axes are x, y, z, but the grid has 2"):
+        import_births(log, tmp_path / "in", GRID, axes=Axes(("x", "y", "z")))

@@ -1,0 +1,103 @@
+"""Two archives compared: where they are the same, where they differ, and what was resampled."""
+
+import numpy as np
+import pyarrow as pa
+import pytest
+
+from nichechain import GridNiches, NichechainError
+from nichechain.births.table import schema
+from nichechain.evolvability.coverage import rarefied_coverage
+from nichechain.validation.contrast import contrast
+
+GRID = GridNiches((4, 4), ((0.0, 1.0), (0.0, 1.0)), "clip")
+
+
+def births(width, seed, runs=1, per_run=1500):
+    """Children land uniformly on the next ``width`` niches; ten elites to a niche."""
+    rng = np.random.default_rng(seed)
+    size = runs * per_run
+    parent = rng.integers(16, size=size)
+    child = (parent + 1 + rng.integers(width, size=size)) % 16
+    nulls = pa.nulls(size)
+    columns = {
+        "run": np.arange(size) // per_run,
+        "uid": np.arange(size) % per_run,
+        "parent_uid": 10 * parent + rng.integers(10, size=size),
+        "parent_niche": parent,
+        "child_niche": child,
+    }
+    target = schema(2)
+    arrays = [pa.array(columns.get(field.name, nulls)).cast(field.type) for field in target]
+    return pa.Table.from_arrays(arrays, schema=target)
+
+
+def test_an_archive_does_not_differ_from_itself():
+    rows = births(4, 0)
+    found = contrast(rows, rows, GRID, resamples=10, l=3, lineages=5)
+    assert [row.difference for row in found.rows] == [0.0, 0.0, 0.0]
+    assert all(row.low < 0 < row.high for row in found.rows[:2])
+    assert found.clusters == (("elites", 160), ("elites", 160))
+
+
+def test_a_livelier_operator_is_found_out():
+    found = contrast(births(2, 1), births(8, 2), GRID, resamples=20, l=2, lineages=10)
+    evolvability, reach, coverage = found.rows
+    assert evolvability.low > 0
+    # A lineage that always moves on visits two niches in two generations, whatever the width.
+    assert (reach.first, reach.second) == pytest.approx((2.0, 2.0), abs=0.01)
+    assert (coverage.first, coverage.second) == (16.0, 16.0)
+    # With 2 ways on, h is 1/2, 3/4, 1/2 and 1/4 for the next four niches: Σ 1 − (1 − h)^10 = 3.942.
+    assert evolvability.first == pytest.approx(3.942, abs=0.05)
+
+
+def test_one_generation_of_one_lineage_is_one_niche():
+    found = contrast(births(3, 3), births(5, 4), GRID, resamples=3, l=1)
+    assert found.rows[1].first == pytest.approx(1.0)
+    assert found.rows[1].second == pytest.approx(1.0)
+
+
+def test_coverage_is_compared_at_equal_births():
+    small, large = births(3, 5, per_run=60), births(3, 6, per_run=900)
+    found = contrast(small, large, GRID, resamples=3, min_births=1, l=1)
+    visits = np.bincount(large["child_niche"].to_numpy(), minlength=16)
+    assert found.births == 60
+    assert found.rows[2].second == pytest.approx(rarefied_coverage(visits, 60))
+    assert found.rows[2].first == np.unique(small["child_niche"].to_numpy()).size
+
+
+def test_runs_are_resampled_where_there_are_several():
+    found = contrast(births(3, 7, runs=4, per_run=500), births(3, 8), GRID, resamples=20, l=1, lineages=10)
+    assert found.clusters == (("runs", 4), ("elites", 160))
+    row = found.rows[0]
+    # Student's quantile for four runs: 2.353.
+    assert row.high - row.difference == pytest.approx(2.3534 * row.standard_error, rel=1e-4)
+
+
+def test_intervals_hold_the_truth_about_as_often_as_they_say():
+    """Archives of one T: 90 % of the intervals should have 0 in them."""
+    inside = [
+        row.low <= 0 <= row.high
+        for seed in range(20)
+        for row in contrast(
+            births(6, 100 + seed), births(6, 200 + seed), GRID, resamples=15, l=2, lineages=8
+        ).rows[:1]
+    ]
+    # P(X < 15) is 1 % for X ~ Binomial(20, 0.9).
+    assert sum(inside) >= 15
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"resamples": 1}, "resamples is 1"),
+        ({"draws": 0}, "draws is 0"),
+        ({"min_births": -1}, "min_births is -1"),
+        ({"min_births": 10**6}, "no niche has 1000000 births"),
+        ({"l": 0}, "l is 0"),
+        ({"lineages": 0}, "lineages is 0"),
+    ],
+)
+def test_bad_arguments(options, said):
+    rows = births(3, 9, per_run=50)
+    with pytest.raises(NichechainError, match=said):
+        contrast(rows, rows, GRID, **options)
