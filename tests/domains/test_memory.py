@@ -67,7 +67,7 @@ def test_threads_limit_the_domain_and_keep_what_it_holds() -> None:
 
 def test_processes_share_what_there_is() -> None:
     with Processes(3, cache_memory=3000) as executor:
-        executor.evaluate(PlanarArm(), np.zeros((1, 100), np.float32))
+        executor.evaluate(PlanarArm(), np.zeros((1, 10), np.float32))
         assert executor._cache_share == 1000
     bench = Workbench(pickle.dumps(FetchPickAndPlace()), 1000)
     assert bench.prepare() is None
