@@ -28,7 +28,7 @@ _COMMIT_SHARE = 0.01
 
 
 @dataclass(frozen=True)
-class Progress:
+class BuildProgress:
     """How far a build is.
 
     Parameters
@@ -53,7 +53,7 @@ def build(
     executor: Executor,
     *,
     domain: Domain | None = None,
-    on_progress: Callable[[Progress], None] | None = None,
+    on_progress: Callable[[BuildProgress], None] | None = None,
     max_failed: float = MOST_FAILED,
 ) -> None:
     """Fill an archive folder, going on from what it holds.
@@ -119,7 +119,7 @@ def build(
             nonlocal under_way
             under_way += done
             if on_progress is not None:
-                on_progress(Progress(search.births + under_way, search.filled, outside, failures.failed))
+                on_progress(BuildProgress(search.births + under_way, search.filled, outside, failures.failed))
 
         def commit() -> None:
             writer.commit(search.state)

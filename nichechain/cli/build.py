@@ -28,7 +28,7 @@ _MANY_NICHES = 1000
 
 
 @dataclass(frozen=True)
-class Build:
+class BuildCommand:
     """Fill an archive: MAP-Elites that records who was born where."""
 
     domain: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="DOMAIN")]
@@ -174,7 +174,7 @@ class Build:
         return config
 
     @classmethod
-    def of(cls, config: BuildConfig) -> Build:
+    def of(cls, config: BuildConfig) -> BuildCommand:
         """The options that ask for a configuration."""
         return cls(
             domain=config.domain,
@@ -224,7 +224,7 @@ def domain_option_text(value: DomainOption) -> str:
 
 def run(arguments: Sequence[str]) -> int:
     """Build, then say what came of it."""
-    command = console.parse(Build, arguments)
+    command = console.parse(BuildCommand, arguments)
     from nichechain import execution
     from nichechain.archive import read, write
     from nichechain.archive.build import build
@@ -251,7 +251,7 @@ def run(arguments: Sequence[str]) -> int:
         if command.descriptor is None:
             check_trusted(stored.config, folder)
         # What is not said again stays as it was.
-        command = console.parse(Build, arguments, default=Build.of(stored.config))
+        command = console.parse(BuildCommand, arguments, default=BuildCommand.of(stored.config))
     config = command.config()
     shown = console.console()
     with execution.make(command.workers, command.cache_memory) as executor:

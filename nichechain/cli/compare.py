@@ -23,7 +23,7 @@ _NAMES = {
 
 
 @dataclass(frozen=True)
-class Compare:
+class CompareCommand:
     """l-evolvability, reach and coverage of one archive against another of the same niches."""
 
     first: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="A")]
@@ -48,7 +48,7 @@ class Compare:
 
 def run(arguments: Sequence[str]) -> int:
     """Compare."""
-    command = console.parse(Compare, arguments)
+    command = console.parse(CompareCommand, arguments)
     from nichechain.archive import read
     from nichechain.archive.archive import load
     from nichechain.evolvability.question import Question

@@ -24,7 +24,7 @@ FORMATS = (".png", ".svg", ".pdf")
 
 
 @dataclass(frozen=True)
-class Estimate:
+class EstimateCommand:
     """The estimate of T from births; which estimator foretells births best; whether they are enough."""
 
     path: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="PATH")]
@@ -53,7 +53,7 @@ class Estimate:
 
 def run(arguments: Sequence[str]) -> int:
     """Say what the births say of T."""
-    command = console.parse(Estimate, arguments)
+    command = console.parse(EstimateCommand, arguments)
     _check(command)
     from nichechain.archive.archive import load
 
@@ -67,7 +67,7 @@ def run(arguments: Sequence[str]) -> int:
     return 0
 
 
-def _check(command: Estimate) -> None:
+def _check(command: EstimateCommand) -> None:
     if command.compare and command.stability:
         raise NichechainError("--compare and --stability exclude each other: ask for one of them")
     belongs: dict[str, tuple[bool, dict[str, object]]] = {
@@ -96,7 +96,7 @@ def _check(command: Estimate) -> None:
             )
 
 
-def _estimate(command: Estimate, archive: Archive) -> None:
+def _estimate(command: EstimateCommand, archive: Archive) -> None:
     chain = archive.chain(command.estimator)
     counts, posterior = archive.counts, chain.posterior
     births = int(counts.births.sum())
@@ -145,7 +145,7 @@ def _estimate(command: Estimate, archive: Archive) -> None:
     _write(pd.DataFrame([content]), content, command)
 
 
-def _compare(command: Estimate, archive: Archive) -> None:
+def _compare(command: EstimateCommand, archive: Archive) -> None:
     from nichechain.validation.held_out import compare_estimators
 
     with console.spinner("holding out elites"):
@@ -179,7 +179,7 @@ def _show_comparison(found: Comparison) -> None:
     )
 
 
-def _stability(command: Estimate, archive: Archive) -> None:
+def _stability(command: EstimateCommand, archive: Archive) -> None:
     from nichechain.validation.stability import rank_stability
 
     with console.spinner("thinning births"):
@@ -235,7 +235,7 @@ def _records(frame: pd.DataFrame) -> Any:
     return json.loads(frame.to_json(orient="records"))
 
 
-def _write(frame: pd.DataFrame, content: dict[str, Any], command: Estimate) -> None:
+def _write(frame: pd.DataFrame, content: dict[str, Any], command: EstimateCommand) -> None:
     print(
         frame.to_csv(index=False) if command.format == "csv" else json.dumps(content, indent=2) + "\n", end=""
     )

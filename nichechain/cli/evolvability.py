@@ -22,7 +22,7 @@ _LABELS = {"posterior": "90 % interval", "prior": "prior band", "bootstrap": "90
 
 
 @dataclass(frozen=True)
-class Evolvability:
+class EvolvabilityCommand:
     """l-evolvability of niches, or of the genotype of an elite."""
 
     path: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="PATH")]
@@ -76,7 +76,7 @@ class Evolvability:
 
 def run(arguments: Sequence[str]) -> int:
     """Score niches or an elite."""
-    command = console.parse(Evolvability, arguments)
+    command = console.parse(EvolvabilityCommand, arguments)
     _check(command)
     from nichechain.archive.archive import load
     from nichechain.evolvability.question import Question
@@ -95,7 +95,7 @@ def run(arguments: Sequence[str]) -> int:
     return 0
 
 
-def _check(command: Evolvability) -> None:
+def _check(command: EvolvabilityCommand) -> None:
     chosen = {"--niche": command.niche, "--elite": command.elite, "--top": command.top}
     given = [name for name, value in chosen.items() if value is not None]
     if len(given) > 1:
@@ -118,7 +118,7 @@ def _check(command: Evolvability) -> None:
             raise NichechainError(f"--{option} is {getattr(command, name)}, but must not be negative")
 
 
-def _one(command: Evolvability, archive: Archive, chain: NicheChain) -> pd.DataFrame:
+def _one(command: EvolvabilityCommand, archive: Archive, chain: NicheChain) -> pd.DataFrame:
     """One row, for a niche or the genotype of its elite."""
     import pandas as pd
 
@@ -155,7 +155,7 @@ def _one(command: Evolvability, archive: Archive, chain: NicheChain) -> pd.DataF
     return pd.DataFrame([{**root, "root": "niche" if command.niche is not None else "elite", **values}])
 
 
-def _best(command: Evolvability, chain: NicheChain) -> pd.DataFrame:
+def _best(command: EvolvabilityCommand, chain: NicheChain) -> pd.DataFrame:
     """The best niches, best first."""
     from nichechain.evolvability import niche_evolvability
 
@@ -173,7 +173,7 @@ def _best(command: Evolvability, chain: NicheChain) -> pd.DataFrame:
     return frame
 
 
-def _set_band(frame: pd.DataFrame, command: Evolvability, archive: Archive) -> None:
+def _set_band(frame: pd.DataFrame, command: EvolvabilityCommand, archive: Archive) -> None:
     """Put the bounds of another band in place of the posterior's interval."""
     from nichechain.evolvability import bootstrap_elites, prior_sensitivity
 
@@ -201,7 +201,7 @@ def _set_band(frame: pd.DataFrame, command: Evolvability, archive: Archive) -> N
     frame["high"] = frame["value"] + (band.high - band.value)[niche]
 
 
-def _write(frame: pd.DataFrame, command: Evolvability) -> None:
+def _write(frame: pd.DataFrame, command: EvolvabilityCommand) -> None:
     if command.format == "csv":
         print(frame.to_csv(index=False), end="")
         return

@@ -14,7 +14,7 @@ from nichechain.core.errors import NichechainError
 
 
 @dataclass(frozen=True)
-class Explore:
+class ExploreCommand:
     """Write a page on which one clicks a niche and sees where its descendants go.
 
     The page is one HTML file that needs no network.
@@ -38,7 +38,7 @@ class Explore:
 
 def run(arguments: Sequence[str]) -> int:
     """Write the page."""
-    command = console.parse(Explore, arguments)
+    command = console.parse(ExploreCommand, arguments)
     if not command.out.parent.is_dir():
         raise NichechainError(f"--out is {str(command.out)!r}, but there is no folder {command.out.parent}")
     if command.out.is_dir():

@@ -13,7 +13,7 @@ from nichechain.cli import console
 
 
 @dataclass(frozen=True)
-class Info:
+class InfoCommand:
     """What is in an archive, with the configuration and versions that made it."""
 
     path: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="PATH")]
@@ -24,7 +24,7 @@ class Info:
 
 def run(arguments: Sequence[str]) -> int:
     """Say what is in the archive."""
-    command = console.parse(Info, arguments)
+    command = console.parse(InfoCommand, arguments)
     from nichechain.archive.archive import load
     from nichechain.search import savings
 

@@ -77,7 +77,7 @@ class LandscapeCommand:
 
 def run(arguments: Sequence[str]) -> int:
     """Measure, write, and say what came of it."""
-    command = console.parse(LandscapeCommand, arguments, name="landscape")
+    command = console.parse(LandscapeCommand, arguments)
     from nichechain import execution
     from nichechain.archive.archive import load
     from nichechain.evolvability.question import Question

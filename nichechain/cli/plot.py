@@ -26,7 +26,7 @@ _FEW_DRAWS = 5
 
 
 @dataclass(frozen=True)
-class Plot:
+class PlotCommand:
     """Draw an archive over behavior space, or its chain."""
 
     path: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="PATH")]
@@ -72,7 +72,7 @@ class Plot:
 
 def run(arguments: Sequence[str]) -> int:
     """Draw."""
-    command = console.parse(Plot, arguments)
+    command = console.parse(PlotCommand, arguments)
     out = command.out or Path(f"{command.kind}.png")
     if out.suffix.lower() not in FORMATS:
         raise NichechainError(f"--out is {str(out)!r}, but must end in one of {', '.join(FORMATS)}")
@@ -108,7 +108,7 @@ def run(arguments: Sequence[str]) -> int:
     return 0
 
 
-def _draw_pair(command: Plot, archive: Archive, left: Axes, right: Axes) -> None:
+def _draw_pair(command: PlotCommand, archive: Archive, left: Axes, right: Axes) -> None:
     from nichechain.evolvability import niche_evolvability
 
     chain = archive.chain(command.estimator)
@@ -138,7 +138,7 @@ def _draw_pair(command: Plot, archive: Archive, left: Axes, right: Axes) -> None
     left.figure.suptitle(chain.estimator, fontsize="small", color="#555555")
 
 
-def _draw(command: Plot, archive: Archive, ax: Axes) -> None:
+def _draw(command: PlotCommand, archive: Archive, ax: Axes) -> None:
     from nichechain import plots
 
     match command.kind:

@@ -20,7 +20,7 @@ FORMATS = (".png", ".svg", ".pdf")
 
 
 @dataclass(frozen=True)
-class Sweep:
+class SweepCommand:
     """Bin an archive's births into grids of other sizes: too few niches, too many, and a suggestion."""
 
     path: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="PATH")]
@@ -47,7 +47,7 @@ class Sweep:
 
 def run(arguments: Sequence[str]) -> int:
     """Sweep, and say what was found."""
-    command = console.parse(Sweep, arguments)
+    command = console.parse(SweepCommand, arguments)
     _check(command)
     from nichechain.archive.archive import load
     from nichechain.validation.grid_size import sweep
@@ -135,7 +135,7 @@ def _numbers(text: str) -> list[float]:
         raise NichechainError(f"--behavior is {text!r}, but must be numbers such as 1.3,0.7") from None
 
 
-def _check(command: Sweep) -> None:
+def _check(command: SweepCommand) -> None:
     for name in ("min_births", "draws"):
         if getattr(command, name) < 1:
             raise NichechainError(

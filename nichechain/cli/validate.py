@@ -24,7 +24,7 @@ _LINE_EVERY = 10.0
 
 
 @dataclass(frozen=True)
-class Validate:
+class ValidateCommand:
     """Test whether births are a Markov chain's, and check its predictions on lineages really run."""
 
     path: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="PATH")]
@@ -50,7 +50,7 @@ class Validate:
 
 def run(arguments: Sequence[str]) -> int:
     """Validate."""
-    command = console.parse(Validate, arguments)
+    command = console.parse(ValidateCommand, arguments)
     from nichechain import execution
     from nichechain.archive.archive import load
     from nichechain.validation import ValidationConfig, validate

@@ -27,7 +27,7 @@ _GROUPS = {
 
 
 @dataclass(frozen=True)
-class Verify:
+class VerifyCommand:
     """Make parts of an archive again from its configuration, and compare to the last bit.
 
     Exit status 0: all that was compared agrees, or what differs can be due to a library or a machine
@@ -54,7 +54,7 @@ class Verify:
 
 def run(arguments: Sequence[str]) -> int:
     """Verify."""
-    command = console.parse(Verify, arguments)
+    command = console.parse(VerifyCommand, arguments)
     from nichechain import execution
     from nichechain.archive.archive import load
     from nichechain.verification import verify

@@ -6,12 +6,14 @@ import math
 import operator
 from collections.abc import Iterable, Mapping
 from numbers import Integral, Real
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, Literal, TypeAlias
 
 from nichechain.core.errors import NichechainError
 
 DomainOption: TypeAlias = str | int | float | bool
 """What a domain can be told besides its seed."""
+StepBound = Literal["per-coordinate", "rescaled"]
+"""How steps of mutation may be bounded."""
 
 if TYPE_CHECKING:
     # A configuration is checked without NumPy, which takes its time to import.

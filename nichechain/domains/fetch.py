@@ -19,7 +19,7 @@ from nichechain.domains.policies.networks import network
 if TYPE_CHECKING:
     from torch import nn
 
-    from nichechain.domains.engine.fetch import Disturbance, Episode, FetchEpisodes
+    from nichechain.domains.engine.fetch import Disturbance, FetchEpisodes, Rollout
 
 
 _OUTPUTS = 4
@@ -180,7 +180,7 @@ class FetchTask:
             noise.only("observation", "action", domain=self.name)
         return self._evaluate(rows, (self._disturbance(noise, int(s)) for s in check_seeds(seeds, rows)))
 
-    def episode(self, genotype: ArrayLike) -> Episode:
+    def episode(self, genotype: ArrayLike) -> Rollout:
         """What the policy of one genotype sees and does: 51 observations and 50 actions."""
         (row,) = check_genotypes(np.asarray(genotype)[None], self.genotype_length)
         return self._episodes.run(self.network, row, self.steps)

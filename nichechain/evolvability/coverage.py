@@ -27,7 +27,7 @@ _COLUMNS = 128
 _DENSE = 0.3
 
 
-class LinearMap(Protocol):
+class LinearOperator(Protocol):
     """A matrix we only multiply with: sparse, dense, or sparse plus low rank."""
 
     @property
@@ -39,8 +39,8 @@ class LinearMap(Protocol):
 
 
 def expected_coverage(
-    transition: LinearMap,
-    first: LinearMap,
+    transition: LinearOperator,
+    first: LinearOperator,
     steps: int,
     lineages: ArrayLike,
     *,
@@ -89,8 +89,8 @@ def expected_coverage(
 
 
 def visit_probabilities(
-    transition: LinearMap,
-    first: LinearMap,
+    transition: LinearOperator,
+    first: LinearOperator,
     steps: int,
     counted: int | None = None,
     columns: int = _COLUMNS,
@@ -124,7 +124,7 @@ def visit_probabilities(
 
 
 def coverage_by_generation(
-    transition: LinearMap, roots: ArrayLike, longest: int, lineages: ArrayLike, counted: int
+    transition: LinearOperator, roots: ArrayLike, longest: int, lineages: ArrayLike, counted: int
 ) -> Floats:
     """Expected niches that lineages of roots visit, for every length up to the longest.
 
@@ -183,7 +183,7 @@ def at_least_once(probability: Floats, trials: Iterable[int]) -> Iterator[Floats
 
 
 def sampled_coverage(
-    transition: LinearMap,
+    transition: LinearOperator,
     first: Floats,
     steps: int,
     lineages: int,
@@ -236,7 +236,7 @@ def sampled_coverage(
     return np.concatenate(found)
 
 
-def entries(transition: LinearMap) -> sparse.csr_array:
+def entries(transition: LinearOperator) -> sparse.csr_array:
     """The entries of a matrix, to walk by.
 
     Raises
@@ -315,7 +315,7 @@ def _counted(counted: int | None, states: int) -> int:
     return counted
 
 
-def _faster(transition: LinearMap) -> LinearMap:
+def _faster(transition: LinearOperator) -> LinearOperator:
     """The matrix in the form that multiplies faster."""
     if sparse.issparse(transition) and transition.nnz > _DENSE * transition.shape[0] ** 2:  # type: ignore[attr-defined]
         dense: Floats = transition.toarray()  # type: ignore[attr-defined]

@@ -32,7 +32,7 @@ _VALUE_DRAWS = 50
 
 
 @dataclass(frozen=True)
-class Difference:
+class ContrastRow:
     """One figure of two archives.
 
     Parameters
@@ -63,7 +63,7 @@ class Contrast:
 
     Parameters
     ----------
-    rows : tuple of Difference
+    rows : tuple of ContrastRow
         ``evolvability``: niches that U lineages reach, ``reach``: niches that one lineage does,
         both as means over the niches compared; ``coverage``: niches filled by as many births as
         the smaller archive has.
@@ -76,7 +76,7 @@ class Contrast:
     l, lineages, min_births, resamples : int
     """
 
-    rows: tuple[Difference, ...]
+    rows: tuple[ContrastRow, ...]
     niches: int
     clusters: tuple[tuple[str, int], tuple[str, int]]
     births: int
@@ -86,7 +86,7 @@ class Contrast:
     resamples: int
 
     def to_frame(self) -> pd.DataFrame:
-        """One row per figure, with the fields of :class:`Difference`."""
+        """One row per figure, with the fields of :class:`ContrastRow`."""
         return pd.DataFrame([asdict(row) for row in self.rows])
 
 
@@ -185,7 +185,7 @@ def contrast(
     error = np.sqrt(spreads[0] + spreads[1])
     quantile = float(stats.t.ppf(0.5 + _LEVEL / 2, max(1, min(freedom))))
     rows = tuple(
-        Difference(
+        ContrastRow(
             name, float(a), float(b), float(d), float(e), float(d - quantile * e), float(d + quantile * e)
         )
         for name, a, b, d, e in zip(

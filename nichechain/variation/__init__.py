@@ -11,7 +11,7 @@ from collections.abc import Callable
 
 from nichechain.core.errors import NichechainError
 from nichechain.variation.additive import BOUND_KINDS, AdditiveMutation, Bound, Mutation
-from nichechain.variation.noise import BallNoise, CauchyNoise, GaussianNoise, Noise, StudentTNoise
+from nichechain.variation.noise import BallNoise, CauchyNoise, GaussianNoise, MutationNoise, StudentTNoise
 from nichechain.variation.self_adaptive import SelfAdaptiveDomain, SelfAdaptiveMutation
 
 __all__ = [
@@ -50,7 +50,7 @@ def uniform_ball(scale: float = 1.0) -> AdditiveMutation:
     return AdditiveMutation(BallNoise(), scale)
 
 
-_NOISES: dict[str, Callable[[], Noise]] = {
+_NOISES: dict[str, Callable[[], MutationNoise]] = {
     "cauchy": CauchyNoise,
     "gaussian": GaussianNoise,
     "student-t": StudentTNoise,
@@ -58,7 +58,7 @@ _NOISES: dict[str, Callable[[], Noise]] = {
 }
 
 
-def noise_of(name: str, df: float | None = None) -> Noise:
+def noise_of(name: str, df: float | None = None) -> MutationNoise:
     """The noise of the operator of that name.
 
     Parameters

@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Literal, Protocol, get_args
+from typing import Any, Protocol, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
-from nichechain.core.checks import check_numbers
+from nichechain.core.checks import StepBound, check_numbers
 from nichechain.core.errors import NichechainError
-from nichechain.variation.noise import IndependentNoise, Noise, truncated
+from nichechain.variation.noise import IndependentNoise, MutationNoise, truncated
 
 Floats = NDArray[np.float64]
 # Of floats of any precision: that of float32 in a search, of others in a test.
 Genotype = NDArray[Any]
 
-StepBound = Literal["per-coordinate", "rescaled"]
 BOUND_KINDS: tuple[str, ...] = get_args(StepBound)
 # Shortens a step a little below the bound, so that rounding does not bring it back to it.
 _BELOW = 1.0 - 1e-12
@@ -72,7 +71,7 @@ class AdditiveMutation:
 
     Parameters
     ----------
-    noise : Noise
+    noise : MutationNoise
         ``noise(rng, n)`` gives n float64 values at scale 1.
     scale : float
         Factor on the noise, positive.
@@ -96,7 +95,7 @@ class AdditiveMutation:
     never leave the set.
     """
 
-    noise: Noise
+    noise: MutationNoise
     scale: float = 1.0
     bound: Bound | None = None
     layers: tuple[int, ...] = ()
@@ -132,7 +131,7 @@ class AdditiveMutation:
         return self.scale * np.repeat(self.layer_scales, self.layers)
 
 
-def check_bound(noise: Noise, bound: Bound | None) -> None:
+def check_bound(noise: MutationNoise, bound: Bound | None) -> None:
     """Check that noise can be bounded so.
 
     Raises
@@ -148,7 +147,11 @@ def check_bound(noise: Noise, bound: Bound | None) -> None:
 
 
 def add_noise(
-    parent: Genotype, rng: np.random.Generator, noise: Noise, scale: float | Floats, bound: Bound | None
+    parent: Genotype,
+    rng: np.random.Generator,
+    noise: MutationNoise,
+    scale: float | Floats,
+    bound: Bound | None,
 ) -> Genotype:
     """One child of a parent.
 
@@ -156,7 +159,7 @@ def add_noise(
     ----------
     parent : (P,) float array
     rng : numpy.random.Generator
-    noise : Noise
+    noise : MutationNoise
     scale : float or (P,) array
         Factor on the noise.
     bound : Bound, optional

@@ -14,7 +14,7 @@ from nichechain.core.errors import NichechainError
 Floats = NDArray[np.float64]
 
 
-class Noise(Protocol):
+class MutationNoise(Protocol):
     """A distribution of steps."""
 
     def __call__(self, rng: np.random.Generator, n: int) -> Floats:
@@ -23,7 +23,7 @@ class Noise(Protocol):
 
 
 @runtime_checkable
-class IndependentNoise(Noise, Protocol):
+class IndependentNoise(MutationNoise, Protocol):
     """Coordinates that are independent and alike, symmetric about 0 and continuous."""
 
     def tail(self, x: Floats) -> Floats:

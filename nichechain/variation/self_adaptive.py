@@ -17,7 +17,7 @@ from nichechain.core.errors import NichechainError
 from nichechain.domains.base import Domain, Evaluation, check_genotypes
 from nichechain.domains.wrapper import Wrapper
 from nichechain.variation.additive import Bound, Genotype, add_noise, check_bound
-from nichechain.variation.noise import Noise
+from nichechain.variation.noise import MutationNoise
 
 if TYPE_CHECKING:
     from torch import nn
@@ -29,7 +29,7 @@ class SelfAdaptiveMutation:
 
     Parameters
     ----------
-    noise : Noise
+    noise : MutationNoise
         What is added to the weights at step size 1.
     layers : tuple of int
         Weights that share a step size, in the order of the genotype; one entry for one step size.
@@ -43,7 +43,7 @@ class SelfAdaptiveMutation:
     Without selection ln σ has no drift, so σ keeps its median.
     """
 
-    noise: Noise
+    noise: MutationNoise
     layers: tuple[int, ...]
     bound: Bound | None = None
 

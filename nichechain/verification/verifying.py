@@ -30,7 +30,7 @@ from nichechain.verification.search import check_pending_again, check_search, ch
 
 
 @dataclass(frozen=True)
-class Progress:
+class VerificationProgress:
     """How far a verification is.
 
     Parameters
@@ -52,7 +52,7 @@ def verify(
     sample: int | None = 100,
     seed: int = 0,
     executor: Executor | None = None,
-    on_progress: Callable[[Progress], None] | None = None,
+    on_progress: Callable[[VerificationProgress], None] | None = None,
 ) -> Verification:
     """Make parts of an archive again from its configuration, and compare to the bit.
 
@@ -129,7 +129,7 @@ class _Work:
     sample: int | None
     seed: int
     executor: Executor
-    on_progress: Callable[[Progress], None] | None
+    on_progress: Callable[[VerificationProgress], None] | None
     checks: list[Check] = field(default_factory=list)
     unverified: list[str] = field(default_factory=list)
     sampled_births: int = 0
@@ -172,7 +172,7 @@ class _Work:
             nonlocal done
             done += more
             if self.on_progress is not None:
-                self.on_progress(Progress(stage, done, total))
+                self.on_progress(VerificationProgress(stage, done, total))
 
         tell(0)
         return tell

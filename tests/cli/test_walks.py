@@ -11,7 +11,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from nichechain.cli import main
-from nichechain.cli.walks import MetricName, Metrics, Mode, Pressure, Sensitivity
+from nichechain.cli.walks import MetricName, MetricsCommand, Mode, PressureCommand, SensitivityCommand
 from nichechain.studies import (
     LEVELS,
     METRICS,
@@ -127,12 +127,12 @@ def test_interrupted(tmp_path):
 def test_defaults_are_those_of_the_studies():
     """The command line writes them out again, so that its help need not import the studies."""
     out = Path("study")
-    assert Pressure("arm", out).conditions() == pressure_conditions(LEVELS, Condition("base"))
-    assert Metrics("arm", out).conditions() == metric_conditions(METRICS, Condition("base"))
+    assert PressureCommand("arm", out).conditions() == pressure_conditions(LEVELS, Condition("base"))
+    assert MetricsCommand("arm", out).conditions() == metric_conditions(METRICS, Condition("base"))
     assert get_args(MetricName) == get_args(conditions.MetricName)
     assert get_args(Mode) == get_args(conditions.Mode)
     for name in VARIATIONS:
-        assert Sensitivity("arm", out, vary=name).conditions() == variations(name, Condition("base"))
+        assert SensitivityCommand("arm", out, vary=name).conditions() == variations(name, Condition("base"))
 
 
 def test_help(capsys):

@@ -302,7 +302,7 @@ def test_lengths_are_refused(generations, lineages, message):
 
 @pytest.mark.parametrize(
     ("generations", "lineages", "repeats", "message"),
-    [(0, 1, 1, "l is 0"), (1, 0, 1, "lineages is 0"), (1, 1, 0, "repeats is 0")],
+    [(0, 1, 1, "steps is 0"), (1, 0, 1, "lineages is 0"), (1, 1, 0, "repeats is 0")],
 )
 def test_simulation_refuses(generations, lineages, repeats, message):
     with pytest.raises(NichechainError, match=message):

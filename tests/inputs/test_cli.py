@@ -62,7 +62,7 @@ _KDE = {"bandwidth": _POSITIVE, "mode": _UNKNOWN, "decay": ("0", "1.1", "nan", *
 TABLE: tuple[tuple[str, str, tuple[str, ...], Bad], ...] = (
     (
         "build",
-        "Build",
+        "BuildCommand",
         ("arm", "--evaluations", "20", "--initial", "5", "--grid", "2x2", "--out", "{fresh}"),
         {
             "domain": ("no-such-thing", "3", "gym:", "gym:NoSuch-v0"),
@@ -97,7 +97,7 @@ TABLE: tuple[tuple[str, str, tuple[str, ...], Bad], ...] = (
     ),
     (
         "compare",
-        "Compare",
+        "CompareCommand",
         ("{archive}", "{archive}", "--resamples", "2"),
         {
             "first": _PATH,
@@ -109,11 +109,11 @@ TABLE: tuple[tuple[str, str, tuple[str, ...], Bad], ...] = (
             **_SCORES,
         },
     ),
-    ("completion", "Completion", ("bash",), {"shell": _UNKNOWN}),
-    ("domains", "Domains", (), {}),
+    ("completion", "CompletionCommand", ("bash",), {"shell": _UNKNOWN}),
+    ("domains", "DomainsCommand", (), {}),
     (
         "estimate",
-        "Estimate",
+        "EstimateCommand",
         ("{archive}",),
         {
             "path": _PATH,
@@ -130,19 +130,19 @@ TABLE: tuple[tuple[str, str, tuple[str, ...], Bad], ...] = (
     ),
     (
         "estimate",
-        "Estimate",
+        "EstimateCommand",
         ("{archive}", "--compare"),
         {"folds": ("1", *_COUNT, "100000"), "seed": ("-1",)},
     ),
     (
         "estimate",
-        "Estimate",
+        "EstimateCommand",
         ("{archive}", "--stability", "--repeats", "1"),
         {"repeats": _COUNT, "min_births": ("100000",), "out": ("file.txt", "/no/such/folder/file.png")},
     ),
     (
         "evolvability",
-        "Evolvability",
+        "EvolvabilityCommand",
         ("{archive}", "--draws", "2"),
         {
             "path": _PATH,
@@ -164,13 +164,13 @@ TABLE: tuple[tuple[str, str, tuple[str, ...], Bad], ...] = (
     ),
     (
         "evolvability",
-        "Evolvability",
+        "EvolvabilityCommand",
         ("{archive}", "--elite", "{niche}"),
         {"workers": _WORKERS, "cache_memory": _MEMORY},
     ),
     (
         "explore",
-        "Explore",
+        "ExploreCommand",
         ("{archive}", "--out", "{fresh}"),
         {
             "path": _PATH,
@@ -182,7 +182,7 @@ TABLE: tuple[tuple[str, str, tuple[str, ...], Bad], ...] = (
     ),
     (
         "import",
-        "Import",
+        "ImportCommand",
         ("{log}", "--grid", "3x2", "--bounds", "0,1,0,1", "--out", "{fresh}"),
         {
             "log": ("/no/such/log.csv", "{archive}/meta.json", "{archive}"),
@@ -197,7 +197,7 @@ TABLE: tuple[tuple[str, str, tuple[str, ...], Bad], ...] = (
             "names": ("x", "x,y,z"),
         },
     ),
-    ("info", "Info", ("{archive}",), {"path": _PATH, "format": _UNKNOWN}),
+    ("info", "InfoCommand", ("{archive}",), {"path": _PATH, "format": _UNKNOWN}),
     (
         "landscape",
         "LandscapeCommand",
@@ -222,13 +222,13 @@ TABLE: tuple[tuple[str, str, tuple[str, ...], Bad], ...] = (
     ),
     (
         "merge",
-        "Merge",
+        "MergeCommand",
         ("{archive}", "{again}", "--out", "{fresh}"),
         {"paths": (*_PATH, "{archive}", "{other}"), "out": ("{archive}",)},
     ),
     (
         "plot",
-        "Plot",
+        "PlotCommand",
         ("{archive}", "reach", "--niche", "{niche}", "--out", "{fresh}.png"),
         {
             "path": _PATH,
@@ -243,19 +243,19 @@ TABLE: tuple[tuple[str, str, tuple[str, ...], Bad], ...] = (
     ),
     (
         "plot",
-        "Plot",
+        "PlotCommand",
         ("{archive}", "reachability", "--out", "{fresh}.png"),
         {"threshold": ("-0.1", "1.1", "nan", *_REAL), "niche": ("0,0",)},
     ),
     (
         "plot",
-        "Plot",
+        "PlotCommand",
         ("{archive}", "evolvability", "--out", "{fresh}.png"),
         {"min_births": _NATURAL, "threshold": ("0.5",)},
     ),
     (
         "sweep",
-        "Sweep",
+        "SweepCommand",
         ("{archive}", "--sizes", "2", "--draws", "2"),
         {
             "path": _PATH,
@@ -269,7 +269,7 @@ TABLE: tuple[tuple[str, str, tuple[str, ...], Bad], ...] = (
     ),
     (
         "validate",
-        "Validate",
+        "ValidateCommand",
         ("{archive}", "--out", "{fresh}", "--elites", "3", "--lineages", "1", "--permutations", "9"),
         {
             "path": _PATH,
@@ -283,7 +283,7 @@ TABLE: tuple[tuple[str, str, tuple[str, ...], Bad], ...] = (
     ),
     (
         "verify",
-        "Verify",
+        "VerifyCommand",
         ("{archive}",),
         {
             "path": _PATH,
@@ -295,25 +295,25 @@ TABLE: tuple[tuple[str, str, tuple[str, ...], Bad], ...] = (
     ),
     (
         "walks pressure",
-        "Pressure",
+        "PressureCommand",
         ("arm", "--out", "{fresh}", "--runs", "2", "--steps", "1", "--offspring", "2"),
         {**_WALKS, "levels": (*_LEVEL, "selective,2", "selective,selective", ""), "metric": _UNKNOWN},
     ),
     (
         "walks pressure",
-        "Pressure",
+        "PressureCommand",
         ("arm", "--out", "{fresh}", "--runs", "2", "--steps", "1", "--metric", "kde"),
         _KDE,
     ),
     (
         "walks metrics",
-        "Metrics",
+        "MetricsCommand",
         ("arm", "--out", "{fresh}", "--runs", "2", "--steps", "1", "--offspring", "2"),
         {**_WALKS, **_KDE, "metrics": ("no-such-thing", "knn,no-such-thing", "knn,knn", ""), "level": _LEVEL},
     ),
     (
         "walks sensitivity",
-        "Sensitivity",
+        "SensitivityCommand",
         ("arm", "--out", "{fresh}", "--runs", "2", "--steps", "1", "--offspring", "2"),
         {
             **{name: values for name, values in _WALKS.items() if name != "scale"},
@@ -324,17 +324,17 @@ TABLE: tuple[tuple[str, str, tuple[str, ...], Bad], ...] = (
     ),
     (
         "walks sensitivity",
-        "Sensitivity",
+        "SensitivityCommand",
         ("arm", "--out", "{fresh}", "--vary", "k", "--metric", "kde", "--runs", "2", "--steps", "1"),
         {**_KDE, "scale": _POSITIVE},
     ),
     (
         "walks resume",
-        "Resume",
+        "ResumeCommand",
         ("{study}",),
         {"path": _PATH, "runs": _COUNT, "workers": _WORKERS, "cache_memory": _MEMORY},
     ),
-    ("walks report", "Report", ("{study}",), {"path": _PATH}),
+    ("walks report", "ReportCommand", ("{study}",), {"path": _PATH}),
 )
 
 # What has no bad value: flags, and texts that may be anything.

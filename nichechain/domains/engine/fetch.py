@@ -29,7 +29,7 @@ _FATAL_WARNINGS = ("CONTACTFULL", "CNSTRFULL", "BADQPOS", "BADQVEL", "BADQACC")
 
 
 @dataclass(frozen=True)
-class Episode:
+class Rollout:
     """What a policy saw and did.
 
     Parameters
@@ -83,7 +83,7 @@ class FetchEpisodes(Protocol):
         genotype: NDArray[np.float32],
         steps: int,
         disturbance: Disturbance = UNDISTURBED,
-    ) -> Episode:
+    ) -> Rollout:
         """One episode; safe to call from several threads."""
         ...
 
@@ -139,7 +139,7 @@ class SteppedFetch:
         genotype: NDArray[np.float32],
         steps: int,
         disturbance: Disturbance = UNDISTURBED,
-    ) -> Episode:
+    ) -> Rollout:
         """One episode; every thread has an environment of its own."""
         policy = controller.policy(genotype)
         # list.pop and list.append are atomic, so the list is a pool without a lock.
@@ -160,7 +160,7 @@ class SteppedFetch:
             observations.append(observation["observation"])
         failure = physics_failure(env.unwrapped.data)
         self._idle.append(env)
-        return Episode(np.array(observations), actions, failure)
+        return Rollout(np.array(observations), actions, failure)
 
 
 class NativeFetch:
@@ -217,7 +217,7 @@ class NativeFetch:
         genotype: NDArray[np.float32],
         steps: int,
         disturbance: Disturbance = UNDISTURBED,
-    ) -> Episode:
+    ) -> Rollout:
         """One episode; every thread has an mjData of its own."""
         assert isinstance(controller, MLP)
         import mujoco
@@ -235,7 +235,7 @@ class NativeFetch:
             known = motions.walk(policy, observations, actions, codes, snapshot)
         if steps and known == steps:
             # Nothing is kept of an episode with warnings.
-            return Episode(observations, actions, "", known)
+            return Rollout(observations, actions, "", known)
 
         start = self._start if disturbance.shift is None else self._displaced(disturbance.shift)
         # list.pop and list.append are atomic, so the list is a pool without a lock.
@@ -278,7 +278,7 @@ class NativeFetch:
             motions.insert(known, observations, codes, states)
         failure = physics_failure(data)
         self._idle.append(data)
-        return Episode(observations, actions, failure, known)
+        return Rollout(observations, actions, failure, known)
 
     def _displaced(self, shift: NDArray[np.float64]) -> mujoco.MjData:
         """The reset state with the block moved, as the environment's reset would place it."""
