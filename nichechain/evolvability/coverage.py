@@ -18,7 +18,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 # Cells of the table (repeats, niches) and walks in flight that a simulation keeps at once.
-_SIMULATION_CELLS = 8_000_000
+_CELLS = 8_000_000
 
 # Target niches treated together.
 _COLUMNS = 128
@@ -219,21 +219,46 @@ def sampled_coverage(
     check_at_least(1, steps=steps, lineages=lineages, repeats=repeats)
     states = transition.shape[0]
     niches = _counted(counted, states)
-    step = RowSampler(entries(transition))
-    start = RowSampler(sparse.csr_array(first[None, :]))
-    at_once = max(1, _SIMULATION_CELLS // max(states, lineages))
     found = []
-    for done in range(0, repeats, at_once):
-        size = min(at_once, repeats - done)
-        repeat = np.repeat(np.arange(size), lineages)
-        seen = np.zeros((size, states), bool)
-        here = start.draw(np.zeros(size * lineages, np.int64), rng)
-        seen[repeat, here] = True
-        for _ in range(steps - 1):
-            here = step.draw(here, rng)
+    for repeat, walks in simulated_lineages(transition, first, steps, lineages, repeats, rng, _CELLS):
+        seen = np.zeros((repeat[-1] + 1, states), bool)
+        for here in walks:
             seen[repeat, here] = True
         found.append(np.count_nonzero(seen[:, :niches], axis=1))
     return np.concatenate(found)
+
+
+def simulated_lineages(
+    transition: LinearOperator,
+    first: Floats,
+    steps: int,
+    lineages: int,
+    repeats: int,
+    rng: np.random.Generator,
+    cells: int,
+) -> Iterator[tuple[Ints, Iterator[Ints]]]:
+    """Lineages of one root, some repeats at a time.
+
+    Parameters
+    ----------
+    transition, first, steps, lineages, repeats, rng
+        As in :func:`sampled_coverage`.
+    cells : int
+        Cells of a table (repeats, states), and lineages, that are simulated at once.
+
+    Yields
+    ------
+    (N,) int64 array
+        The repeat that each lineage belongs to, counted from 0 again each time.
+    iterator of (N,) int64 arrays
+        Their states, step after step: to be exhausted before the next repeats are asked for.
+    """
+    onward, begin = RowSampler(entries(transition)), RowSampler(first[None, :])
+    at_once = max(1, cells // max(transition.shape[0], lineages))
+    for done in range(0, repeats, at_once):
+        repeat = np.repeat(np.arange(min(at_once, repeats - done)), lineages)
+        start = begin.draw(np.zeros(repeat.size, np.int64), rng)
+        yield repeat, onward.walk(start, steps, rng)
 
 
 def entries(transition: LinearOperator) -> sparse.csr_array:

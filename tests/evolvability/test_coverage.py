@@ -234,7 +234,7 @@ def test_simulation_stays_in_its_row_for_the_largest_random_number():
 
 
 def test_simulation_in_pieces_of_bounded_memory(monkeypatch):
-    monkeypatch.setattr(coverage, "_SIMULATION_CELLS", 70)
+    monkeypatch.setattr(coverage, "_CELLS", 70)
     rng = np.random.default_rng(2)
     transition = _random_chain(rng, 5)
     found = sampled_coverage(transition, transition[0], 3, 4, 3001, rng)

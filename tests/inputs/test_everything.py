@@ -204,6 +204,7 @@ EXEMPT: dict[tuple[str, str], str] = {
         ("validation.held_out.probability_of", "parent child", _WITHIN),
         ("evolvability.coverage.visit_probabilities", "steps counted columns", _WITHIN),
         ("evolvability.coverage.at_least_once", "probability trials", _WITHIN),
+        ("evolvability.coverage.simulated_lineages", "first steps lineages repeats cells", _WITHIN),
         ("evolvability.coverage.sampled_coverage", "first", _WITHIN),
         ("execution.base.evaluate_rows", "genotypes", _WITHIN),
         ("studies.running.run", "on_progress", _WITHIN),
