@@ -63,6 +63,9 @@ class EvolvabilityCommand:
     """Seed of draws, simulations and offspring."""
     workers: Annotated[str | None, console.option("WORKERS", "one thread per processor")] = None
     """Who evaluates an elite's offspring: a number of threads, processes:N, ray or ray://HOST:PORT."""
+    cache_memory: Annotated[str | None, console.option("SIZE", "2GiB")] = None
+    """Memory on each machine for physics that was computed before, such as 500MB, or 0 for none. The result
+    is the same."""
     format: Literal["table", "csv", "json"] = "table"
     """How to write it."""
 
@@ -132,7 +135,10 @@ def _one(command: EvolvabilityCommand, archive: Archive, chain: NicheChain) -> p
         assert command.elite is not None
         elite = archive.elite(parse_niche(command.elite, "--elite"))
         state = elite.state
-        with execution.make(command.workers) as executor, console.spinner("evaluating the elite's offspring"):
+        with (
+            execution.make(command.workers, command.cache_memory) as executor,
+            console.spinner("evaluating the elite's offspring"),
+        ):
             result = genotype_evolvability(
                 archive,
                 elite,

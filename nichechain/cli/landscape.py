@@ -63,6 +63,9 @@ class LandscapeCommand:
     """Seed of the offspring, of the sample of elites and of posterior draws."""
     workers: Annotated[str | None, console.option("WORKERS", "one thread per processor")] = None
     """Who evaluates: a number of threads, processes:N, ray or ray://HOST:PORT. The result is the same."""
+    cache_memory: Annotated[str | None, console.option("SIZE", "2GiB")] = None
+    """Memory on each machine for physics that was computed before, such as 500MB, or 0 for none. The result
+    is the same."""
     out: Annotated[Path | None, console.option("FILE", "NAME-landscape.csv")] = None
     """Table to write, .csv or .parquet; beside it the summary (.json) and the maps (.png)."""
     resume: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
@@ -110,7 +113,7 @@ def run(arguments: Sequence[str]) -> int:
     total = measured * (1 + command.offspring)
     done = 0
     shown = console.console()
-    with execution.make(command.workers) as executor:
+    with execution.make(command.workers, command.cache_memory) as executor:
         try:
             with console.counting(total, "evaluations") as tell:
 
