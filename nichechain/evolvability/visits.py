@@ -9,17 +9,13 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy import sparse
 
 from nichechain.chain.model import NicheChain, Transition
-from nichechain.core.checks import as_floats, check_whole
+from nichechain.core.checks import as_floats
 from nichechain.core.errors import NichechainError
 from nichechain.core.randomness import Purpose, keyed
-from nichechain.core.row_sampler import RowSampler
-from nichechain.evolvability import DRAWS, Convention
-from nichechain.evolvability.coverage import check_lengths, entries
-from nichechain.evolvability.reach import check_draws
-from nichechain.evolvability.roots import Root, generations, transition_draws
+from nichechain.evolvability.coverage import simulated_lineages
+from nichechain.evolvability.question import DRAWS, Convention, Question, Root
 from nichechain.niches import Niche
 
 Floats = NDArray[np.float64]
@@ -70,7 +66,7 @@ class VisitMetrics:
     entropy: Estimate
     distance: Estimate
     inside: float
-    l: int  # noqa: E741  # the paper's name
+    l: int
     lineages: int
     repeats: int
     convention: str
@@ -82,7 +78,7 @@ def visit_metrics(
     *,
     niche: Niche | None = None,
     offspring: ArrayLike | None = None,
-    l: int = 5,  # noqa: E741
+    l: int = 5,
     lineages: int = 100,
     convention: Convention = "definition",
     repeats: int = 100,
@@ -114,20 +110,15 @@ def visit_metrics(
     "Novelty search makes evolvability inevitable". Few descendants in many niches are never quite
     uniform: compare uniformity and entropy at equal l and U only.
     """
-    check_lengths(l, lineages)
-    check_draws(convention, draws)
-    check_whole(repeats=repeats)
-    if repeats < 1:
-        raise NichechainError(f"repeats is {repeats}, but at least 1 is needed")
+    question = Question(l, lineages, convention, repeats=repeats, draws=draws, seed=seed)
     root = Root(chain, niche=niche, offspring=offspring)
-    steps = generations(l, convention)
-    size = repeats if chain.posterior is None else max(1, math.ceil(repeats / draws))
-    start = root.state if convention == "definition" else None
+    size = question.repeats_of_each(chain)
+    start = None if question.root_counts else root.state
     samples = []
-    for number, transition in enumerate(transition_draws(chain, draws, seed)):
+    for number, transition in enumerate(question.transitions(chain)):
         rng = keyed(seed, Purpose.WALKS, number)
-        first = root.first(transition, convention)
-        walks = _walks(transition, first, start, steps, lineages, size, rng, chain)
+        first = root.first(transition, question)
+        walks = _walks(transition, first, start, question.steps, lineages, size, rng, chain)
         samples.append(np.concatenate(list(walks), axis=1))
     found = np.stack(samples)
     coverage, uniformity, occupied, entropy, distance = (_estimate(found[:, k]) for k in range(5))
@@ -217,24 +208,17 @@ def _walks(
     chain: NicheChain,
 ) -> Iterator[Floats]:
     """Metrics of simulated repeats, (5, r) at a time, in the order of the fields."""
-    onward = RowSampler(entries(transition))
-    begin = RowSampler(sparse.csr_array(first[None, :]))
     centers = _centers(chain)
-    at_once = max(1, _CELLS // max(chain.states, lineages))
-    for done in range(0, repeats, at_once):
-        size = min(at_once, repeats - done)
-        row = np.repeat(np.arange(size), lineages) * chain.states
+    for repeat, walks in simulated_lineages(transition, first, steps, lineages, repeats, rng, _CELLS):
+        size = repeat[-1] + 1
         visits = np.zeros(size * chain.states, np.int64)
-        length = np.zeros(size * lineages)
-        here = begin.draw(np.zeros(size * lineages, np.int64), rng)
-        if start is not None:
-            length += _apart(centers, np.full(here.size, start), here)
-        visits += np.bincount(row + here, minlength=visits.size)
-        for _ in range(steps - 1):
-            after = onward.draw(here, rng)
-            length += _apart(centers, here, after)
-            here = after
-            visits += np.bincount(row + here, minlength=visits.size)
+        length = np.zeros(repeat.size)
+        before = None if start is None else np.full(repeat.size, start)
+        for here in walks:
+            if before is not None:
+                length += _apart(centers, before, here)
+            visits += np.bincount(repeat * chain.states + here, minlength=visits.size)
+            before = here
         counts = visits.reshape(size, chain.states)[:, : chain.n_niches]
         yield np.stack(
             [

@@ -11,15 +11,17 @@ import pyarrow as pa
 from numpy.typing import NDArray
 from scipy import stats
 
+from nichechain.births.joins import across_runs
 from nichechain.births.table import NONE, check_columns
 from nichechain.chain.base_measure import BaseMeasure
 from nichechain.chain.counts import TransitionCounts
 from nichechain.chain.empirical_bayes import design_effect, most_likely
 from nichechain.chain.posterior import DirichletPosterior
-from nichechain.core.checks import check_whole
+from nichechain.core.checks import check_at_least
 from nichechain.core.errors import NichechainError
 from nichechain.core.randomness import Purpose, keyed
-from nichechain.evolvability.coverage import check_lengths, expected_coverage, rarefied_coverage
+from nichechain.evolvability.coverage import expected_coverage, rarefied_coverage
+from nichechain.evolvability.question import Question
 from nichechain.niches import Niches
 
 Floats = NDArray[np.float64]
@@ -31,7 +33,7 @@ _VALUE_DRAWS = 50
 
 
 @dataclass(frozen=True)
-class Difference:
+class ContrastRow:
     """One figure of two archives.
 
     Parameters
@@ -62,7 +64,7 @@ class Contrast:
 
     Parameters
     ----------
-    rows : tuple of Difference
+    rows : tuple of ContrastRow
         ``evolvability``: niches that U lineages reach, ``reach``: niches that one lineage does,
         both as means over the niches compared; ``coverage``: niches filled by as many births as
         the smaller archive has.
@@ -75,17 +77,17 @@ class Contrast:
     l, lineages, min_births, resamples : int
     """
 
-    rows: tuple[Difference, ...]
+    rows: tuple[ContrastRow, ...]
     niches: int
     clusters: tuple[tuple[str, int], tuple[str, int]]
     births: int
-    l: int  # noqa: E741  # the paper's name
+    l: int
     lineages: int
     min_births: int
     resamples: int
 
     def to_frame(self) -> pd.DataFrame:
-        """One row per figure, with the fields of :class:`Difference`."""
+        """One row per figure, with the fields of :class:`ContrastRow`."""
         return pd.DataFrame([asdict(row) for row in self.rows])
 
 
@@ -94,7 +96,7 @@ def contrast(
     second: pa.Table,
     niches: Niches,
     *,
-    l: int = 5,  # noqa: E741
+    l: int = 5,
     lineages: int = 100,
     min_births: int = 20,
     resamples: int = 100,
@@ -139,15 +141,9 @@ def contrast(
     every figure, so only their spread is used: the interval is the difference ± its standard error
     times Student's quantile, and for few runs r the spread is corrected by √(r/(r − 1)).
     """
-    check_lengths(l, lineages)
-    check_whole(resamples=resamples, draws=draws, min_births=min_births)
-    for name, number, least in (
-        ("resamples", resamples, 2),
-        ("draws", draws, 1),
-        ("min_births", min_births, 0),
-    ):
-        if number < least:
-            raise NichechainError(f"{name} is {number}, but must be at least {least}")
+    question = Question(l, lineages, draws=draws, seed=seed)
+    check_at_least(2, resamples=resamples)
+    check_at_least(0, min_births=min_births)
     sides = _Side.of(first, niches), _Side.of(second, niches)
     whole = [side.counts() for side in sides]
     enough = [counts.births[: len(niches)] >= max(1, min_births) for counts in whole]
@@ -165,11 +161,12 @@ def contrast(
         def figures(counts: TransitionCounts, draws: int, rng: np.random.Generator) -> Floats:
             base = BaseMeasure.pooled(counts, weights)  # noqa: B023  # called in this round only
             posterior = DirichletPosterior(counts, base, strength, effect)  # noqa: B023
-            lineages_of = [lineages, 1]
             found = np.zeros(2)
             for _ in range(draws):
                 T = posterior.draw(rng)
-                covered = expected_coverage(T, T[compared], l, lineages_of, counted=len(niches))
+                covered = expected_coverage(
+                    T, T[compared], question.steps, [lineages, 1], counted=len(niches)
+                )
                 found += covered.mean(axis=0) / draws
             visits = counts.visits
             return np.append(
@@ -189,7 +186,7 @@ def contrast(
     error = np.sqrt(spreads[0] + spreads[1])
     quantile = float(stats.t.ppf(0.5 + _LEVEL / 2, max(1, min(freedom))))
     rows = tuple(
-        Difference(
+        ContrastRow(
             name, float(a), float(b), float(d), float(e), float(d - quantile * e), float(d + quantile * e)
         )
         for name, a, b, d, e in zip(
@@ -230,10 +227,9 @@ class _Side:
             for name in ("parent_niche", "child_niche", "parent_uid", "run")
         )
         parent, child, uid, run = (column[child != NONE] for column in (parent, child, uid, run))
-        span = 1 + uid.max(initial=0)
+        (elite,) = across_runs(run, uid)
         # A birth of a parent that is not known is a cluster, and an elite, of its own.
-        lonely = span * (1 + run.max(initial=0)) + np.arange(uid.size)
-        elite = np.where(uid == NONE, lonely, run * span + uid)
+        elite = np.where(elite == NONE, elite.max(initial=NONE) + 1 + np.arange(elite.size), elite)
         names, by_run = np.unique(run, return_inverse=True)
         if names.size > 1:
             return cls(niches, parent, child, elite, by_run.ravel().astype(np.int64), "runs", names.size)

@@ -103,7 +103,7 @@ CALLS = (
     ),
     Call(
         "niches.parse_niche",
-        lambda w: {"text": "1,2", "option": "--niche"},
+        lambda w: {"text": "1,2"},
         {"text": ("", "a", "1;2", "0.5")},
     ),
     Call("niches.parse_niches", lambda w: {"text": "cvt:4"}, {"text": ("", "4", "cvt:0", "cvt:x", "grid:4")}),
@@ -163,7 +163,11 @@ CALLS = (
         },
     ),
     *(
-        Call(f"domains.{name}", lambda w: {}, {"seed": SEED, "controller": ("lstm", "mlp:x", "mlp:0")})
+        Call(
+            f"domains.{name}",
+            lambda w: {},
+            {"seed": SEED, "controller": ("lstm", "mlp:x", "mlp:0"), "cache_memory": whole(-1)},
+        )
         for name in ("FetchPickAndPlace", "FetchPush", "FetchReach", "FetchSlide")
     ),
     Call("domains.Noise", lambda w: {}, {"observation": _NOISE, "action": _NOISE, "initial": _NOISE}),

@@ -7,7 +7,7 @@ import pytest
 
 import nichechain as nc
 from nichechain.evolvability.coverage import expected_coverage, visit_probabilities
-from nichechain.plots.explorer import CompactTransition, write_explorer
+from nichechain.plots.explorer import rounded_transition, write_explorer
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 DRIVER = shutil.which("chromedriver")
@@ -101,7 +101,7 @@ def reached(browser, niche):
 def test_page_computes_what_the_library_does(chromium, pages, archive, estimator):
     chromium.get(pages[estimator])
     chain = archive.chain(estimator)
-    transition = CompactTransition.of(chain).toarray()
+    transition = rounded_transition(chain).toarray()
     n = len(archive.niches)
     found = np.stack([reached(chromium, niche) for niche in range(n)], axis=1)
     assert found.shape == (10, n, chain.states)
@@ -143,7 +143,7 @@ def test_sliders_count_again(browser, archive):
     rectangle(browser, archive, (3, 4)).click()
     state = archive.niches.flat((3, 4))
     chain = archive.chain()
-    for l in (1, 9):  # noqa: E741
+    for l in (1, 9):
         slide(browser, "l", l)
         expected = expected_coverage(chain.T, chain.T[[state]], l, 50, counted=len(archive.niches))[0]
         assert text(browser, "plug-in") == f"{expected:.1f}"

@@ -6,9 +6,9 @@ import nichechain as nc
 from nichechain.births.table import NONE
 from nichechain.core.errors import NichechainError
 from nichechain.core.randomness import Purpose, keyed
+from nichechain.core.row_sampler import RowSampler
 from nichechain.domains import Evaluation, PlanarArm
 from nichechain.validation import Lineages, compare, run_lineages, sample_roots, simulate_lineages
-from nichechain.validation.simulate import RowSampler
 
 from .conftest import scattered_chain
 
@@ -131,7 +131,7 @@ def test_simulated_checks_have_the_mean_that_is_predicted(arm, lineages):
         assert (np.abs(mean - prediction.value) < 5 * error)[:, first:].all()
 
 
-def known_check(seed, roots=150, lineages=15, l=4):  # noqa: E741
+def known_check(seed, roots=150, lineages=15, l=4):
     """Lineages of a known chain, and what it predicts of them."""
     rng = np.random.default_rng(seed)
     niches = nc.GridNiches((7, 7), ((0, 1), (0, 1)))
@@ -139,7 +139,7 @@ def known_check(seed, roots=150, lineages=15, l=4):  # noqa: E741
     rows = [rng.dirichlet(np.full(50, width)) for width in np.geomspace(0.01, 0.5, 50)]
     chain = nc.NicheChain(rows, niches=niches, outside=49)
     start = np.arange(roots) % 49
-    draw = RowSampler(chain.T)
+    draw = RowSampler(chain.T).draw
     first = draw(np.repeat(start, lineages), rng).reshape(roots, lineages)
     offspring = draw(np.repeat(start, 30), rng).reshape(roots, 30)
     states = simulate_lineages(chain.T, first, l, rng)
