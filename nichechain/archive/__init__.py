@@ -12,13 +12,14 @@ from nichechain.archive.exports import (
     write_phylogeny,
     write_stn,
 )
-from nichechain.archive.imported import Axes, import_births
+from nichechain.archive.imported import Axes, Columns, import_births
 from nichechain.archive.merge import merge
 
 __all__ = [
     "Archive",
     "Axes",
     "BuildProgress",
+    "Columns",
     "Elite",
     "build",
     "genealogy",

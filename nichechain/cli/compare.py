@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import tyro
 
 from nichechain.cli import console
+from nichechain.core.checks import check_at_least
 from nichechain.core.errors import NichechainError
 
 if TYPE_CHECKING:
@@ -55,8 +56,7 @@ def run(arguments: Sequence[str]) -> int:
     from nichechain.validation.contrast import contrast
 
     Question(command.l, command.lineages)
-    if command.seed < 0:
-        raise NichechainError(f"--seed is {command.seed}, but must not be negative")
+    check_at_least(0, **{"--seed": command.seed})
     archives = load(command.first), load(command.second)
     if archives[0].niches != archives[1].niches:
         raise NichechainError(

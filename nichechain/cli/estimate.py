@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import tyro
 
 from nichechain.cli import console
+from nichechain.core.checks import check_at_least
 from nichechain.core.errors import NichechainError
 
 if TYPE_CHECKING:
@@ -81,10 +82,7 @@ def _check(command: EstimateCommand) -> None:
         for name, value in options.items():
             if value is not None and not asked:
                 raise NichechainError(f"{name} belongs to {owner}, which is not given")
-    for name in ("seed", "min_births"):
-        if getattr(command, name) < 0:
-            option = name.replace("_", "-")
-            raise NichechainError(f"--{option} is {getattr(command, name)}, but must not be negative")
+    check_at_least(0, **{"--seed": command.seed, "--min-births": command.min_births})
     if command.out is not None:
         if command.out.suffix.lower() not in FORMATS:
             raise NichechainError(

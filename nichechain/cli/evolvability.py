@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import tyro
 
 from nichechain.cli import console
+from nichechain.core.checks import check_at_least
 from nichechain.core.errors import NichechainError
 
 if TYPE_CHECKING:
@@ -62,6 +63,9 @@ class EvolvabilityCommand:
     """Seed of draws, simulations and offspring."""
     workers: Annotated[str | None, console.option("WORKERS", "one thread per processor")] = None
     """Who evaluates an elite's offspring: a number of threads, processes:N, ray or ray://HOST:PORT."""
+    cache_memory: Annotated[str | None, console.option("SIZE", "2GiB")] = None
+    """Memory on each machine for physics that was computed before, such as 500MB, or 0 for none. The result
+    is the same."""
     format: Literal["table", "csv", "json"] = "table"
     """How to write it."""
 
@@ -106,13 +110,9 @@ def _check(command: EvolvabilityCommand) -> None:
         if command.method != "exact":
             raise NichechainError(f"{wanted} is computed in closed form, not by {command.method}")
     for name in ("top", "offspring", "draws", "repeats"):
-        value = getattr(command, name)
-        if value is not None and value < 1:
-            raise NichechainError(f"--{name} is {value}, but must be at least 1")
-    for name in ("seed", "min_births"):
-        if getattr(command, name) < 0:
-            option = name.replace("_", "-")
-            raise NichechainError(f"--{option} is {getattr(command, name)}, but must not be negative")
+        if getattr(command, name) is not None:
+            check_at_least(1, **{f"--{name}": getattr(command, name)})
+    check_at_least(0, **{"--seed": command.seed, "--min-births": command.min_births})
 
 
 def _one(command: EvolvabilityCommand, archive: Archive, chain: NicheChain) -> pd.DataFrame:
@@ -135,7 +135,10 @@ def _one(command: EvolvabilityCommand, archive: Archive, chain: NicheChain) -> p
         assert command.elite is not None
         elite = archive.elite(parse_niche(command.elite, "--elite"))
         state = elite.state
-        with execution.make(command.workers) as executor, console.spinner("evaluating the elite's offspring"):
+        with (
+            execution.make(command.workers, command.cache_memory) as executor,
+            console.spinner("evaluating the elite's offspring"),
+        ):
             result = genotype_evolvability(
                 archive,
                 elite,

@@ -10,6 +10,7 @@ from typing import Annotated, Literal
 import tyro
 
 from nichechain.cli import console
+from nichechain.core.checks import check_at_least
 from nichechain.core.errors import NichechainError
 
 
@@ -43,8 +44,7 @@ def run(arguments: Sequence[str]) -> int:
         raise NichechainError(f"--out is {str(command.out)!r}, but there is no folder {command.out.parent}")
     if command.out.is_dir():
         raise NichechainError(f"--out is {str(command.out)!r}, but that is a folder")
-    if command.seed < 0:
-        raise NichechainError(f"--seed is {command.seed}, but must not be negative")
+    check_at_least(0, **{"--seed": command.seed})
     from nichechain.archive.archive import load
     from nichechain.plots.explorer import write_explorer
 

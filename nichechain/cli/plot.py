@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import tyro
 
 from nichechain.cli import console
+from nichechain.core.checks import check_at_least
 from nichechain.core.errors import NichechainError
 
 if TYPE_CHECKING:
@@ -80,8 +81,7 @@ def run(arguments: Sequence[str]) -> int:
         raise NichechainError(f"--out is {str(out)!r}, but there is no folder {out.parent}")
     if not 10 <= command.dpi <= 2000:
         raise NichechainError(f"--dpi is {command.dpi}, but must be between 10 and 2000")
-    if command.min_births < 0:
-        raise NichechainError(f"--min-births is {command.min_births}, but must not be negative")
+    check_at_least(0, **{"--min-births": command.min_births})
     if command.threshold is not None and command.kind not in _WITH_THRESHOLD:
         raise NichechainError(f"--threshold belongs to {', '.join(_WITH_THRESHOLD)}, not to {command.kind}")
     from nichechain.archive.archive import load

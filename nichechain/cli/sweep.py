@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 from nichechain.cli import console
+from nichechain.core.checks import check_at_least
 from nichechain.core.errors import NichechainError
 
 if TYPE_CHECKING:
@@ -136,13 +137,8 @@ def _numbers(text: str) -> list[float]:
 
 
 def _check(command: SweepCommand) -> None:
-    for name in ("min_births", "draws"):
-        if getattr(command, name) < 1:
-            raise NichechainError(
-                f"--{name.replace('_', '-')} is {getattr(command, name)}, but must be at least 1"
-            )
-    if command.seed < 0:
-        raise NichechainError(f"--seed is {command.seed}, but must not be negative")
+    check_at_least(1, **{"--min-births": command.min_births, "--draws": command.draws})
+    check_at_least(0, **{"--seed": command.seed})
     if command.out is not None:
         if command.out.suffix.lower() not in FORMATS:
             raise NichechainError(

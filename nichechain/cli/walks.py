@@ -94,6 +94,9 @@ class _Walks:
     """Options of the domain, such as joints=20 of the arm, or descriptor=final-xy of a gym:ENV_ID."""
     workers: Annotated[str | None, console.option("WORKERS", "one thread per processor")] = None
     """Who evaluates: a number of threads, processes:N, ray or ray://HOST:PORT. The result is the same."""
+    cache_memory: Annotated[str | None, console.option("SIZE", "2GiB")] = None
+    """Memory on each machine for physics that was computed before, such as 500MB, or 0 for none. The result
+    is the same."""
 
     def base(self) -> Condition:
         """What all conditions share."""
@@ -169,6 +172,9 @@ class ResumeCommand:
     """Walks of each kind."""
     workers: Annotated[str | None, console.option("WORKERS", "one thread per processor")] = None
     """Who evaluates: a number of threads, processes:N, ray or ray://HOST:PORT. The result is the same."""
+    cache_memory: Annotated[str | None, console.option("SIZE", "2GiB")] = None
+    """Memory on each machine for physics that was computed before, such as 500MB, or 0 for none. The result
+    is the same."""
 
 
 @dataclass(frozen=True)
@@ -206,7 +212,7 @@ def _begin(command: PressureCommand | MetricsCommand | SensitivityCommand, kind:
 
     options = dict(domain_option(text) for text in command.options)
     domain = domains.make(command.domain, seed=command.domain_seed, **options)
-    return _walk(_study(command, kind, domain, options), domain, command.out, command.workers)
+    return _walk(_study(command, kind, domain, options), domain, command.out, command)
 
 
 def _resume(command: ResumeCommand) -> int:
@@ -219,14 +225,14 @@ def _resume(command: ResumeCommand) -> int:
     check_trusted(same, command.path)
     if command.runs is not None:
         study = replace(study, runs=command.runs)
-    return _walk(study, study.make_domain(), command.path, command.workers)
+    return _walk(study, study.make_domain(), command.path, command)
 
 
-def _walk(study: Study, domain: Domain, folder: Path, workers: str | None) -> int:
+def _walk(study: Study, domain: Domain, folder: Path, command: _Walks | ResumeCommand) -> int:
     from nichechain import execution
     from nichechain.studies.running import run as walk_study
 
-    with execution.make(workers) as executor:
+    with execution.make(command.workers, command.cache_memory) as executor:
         with console.spinner("loading the domain"):
             domain.evaluate(domain.sample(1, seed=0))
         try:

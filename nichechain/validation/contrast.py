@@ -11,6 +11,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 from scipy import stats
 
+from nichechain.births.joins import across_runs
 from nichechain.births.table import NONE, check_columns
 from nichechain.chain.base_measure import BaseMeasure
 from nichechain.chain.counts import TransitionCounts
@@ -226,10 +227,9 @@ class _Side:
             for name in ("parent_niche", "child_niche", "parent_uid", "run")
         )
         parent, child, uid, run = (column[child != NONE] for column in (parent, child, uid, run))
-        span = 1 + uid.max(initial=0)
+        (elite,) = across_runs(run, uid)
         # A birth of a parent that is not known is a cluster, and an elite, of its own.
-        lonely = span * (1 + run.max(initial=0)) + np.arange(uid.size)
-        elite = np.where(uid == NONE, lonely, run * span + uid)
+        elite = np.where(elite == NONE, elite.max(initial=NONE) + 1 + np.arange(elite.size), elite)
         names, by_run = np.unique(run, return_inverse=True)
         if names.size > 1:
             return cls(niches, parent, child, elite, by_run.ravel().astype(np.int64), "runs", names.size)

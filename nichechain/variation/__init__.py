@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from nichechain.core.checks import check_choice
 from nichechain.core.errors import NichechainError
 from nichechain.variation.additive import BOUND_KINDS, AdditiveMutation, Bound, Mutation
 from nichechain.variation.noise import BallNoise, CauchyNoise, GaussianNoise, MutationNoise, StudentTNoise
@@ -74,8 +75,7 @@ def noise_of(name: str, df: float | None = None) -> MutationNoise:
     NichechainError
         If there is none, or degrees of freedom are given to another than student-t.
     """
-    if name not in _NOISES:
-        raise NichechainError(f"mutation is {name!r}, but must be one of {', '.join(_NOISES)}")
+    check_choice("mutation", name, _NOISES)
     if df is None:
         return _NOISES[name]()
     if name != "student-t":

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Protocol, get_args
+from typing import Any, Protocol, cast, get_args, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
-from nichechain.core.checks import StepBound, check_numbers
+from nichechain.core.checks import StepBound, check_choice, check_positive
 from nichechain.core.errors import NichechainError
+from nichechain.domains.base import Domain, Wrapper
 from nichechain.variation.noise import IndependentNoise, MutationNoise, truncated
 
 Floats = NDArray[np.float64]
@@ -56,13 +57,8 @@ class Bound:
     size: float
 
     def __post_init__(self) -> None:
-        if self.kind not in BOUND_KINDS:
-            raise NichechainError(
-                f"step bound is of kind {self.kind!r}, but must be one of {', '.join(BOUND_KINDS)}"
-            )
-        check_numbers(step_bound=self.size)
-        if not (np.isfinite(self.size) and self.size > 0):
-            raise NichechainError(f"step bound is {self.size:g}, but must be a positive number")
+        check_choice("kind of step bound", self.kind, BOUND_KINDS)
+        check_positive(step_bound=self.size)
 
 
 @dataclass(frozen=True)
@@ -102,18 +98,14 @@ class AdditiveMutation:
     layer_scales: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
-        check_numbers(mutation_scale=self.scale)
-        if not (np.isfinite(self.scale) and self.scale > 0):
-            raise NichechainError(f"mutation scale is {self.scale}, but must be a positive number")
+        check_positive(scale=self.scale)
         if len(self.layers) != len(self.layer_scales):
             raise NichechainError(
                 f"layer scales are {_listed(self.layer_scales)}, but there are {len(self.layers)} layers "
                 f"({_listed(self.layers)} weights): one scale per layer"
             )
         for scale in self.layer_scales:
-            check_numbers(layer_scale=scale)
-            if not (np.isfinite(scale) and scale > 0):
-                raise NichechainError(f"layer scale is {scale:g}, but must be a positive number")
+            check_positive(layer_scale=scale)
         check_bound(self.noise, self.bound)
 
     def __call__(self, parent: Genotype, rng: np.random.Generator) -> Genotype:
@@ -195,3 +187,78 @@ def _rounded(parent: Genotype, step: Floats, limit: Floats) -> Genotype:
 
 def _listed(values: tuple[float, ...]) -> str:
     return ", ".join(f"{value:g}" for value in values) or "none"
+
+
+@runtime_checkable
+class Layered(Protocol):
+    """A domain or controller whose genotype is made of layers."""
+
+    @property
+    def layers(self) -> tuple[int, ...]:
+        """Evolved parameters of each layer, in the order of the genotype."""
+        ...
+
+
+def layers_of(domain: Domain) -> tuple[int, ...]:
+    """Evolved parameters of each layer of a domain's controller.
+
+    A domain tells its layers by a property ``layers``, or by a ``network`` that has one, such as
+    :class:`nichechain.domains.policies.controllers.MLP`.
+
+    Raises
+    ------
+    NichechainError
+        If it has no layers, or they do not make up its genotype.
+    """
+    told: object = domain
+    while isinstance(told, Wrapper):
+        told = told.domain
+    if not isinstance(told, Layered):
+        told = getattr(told, "network", None)
+    if not isinstance(told, Layered):
+        raise NichechainError(f"{domain.name} has no layers, so it takes one scale and no layer scales")
+    layers = tuple(int(size) for size in told.layers)
+    if sum(layers) != domain.genotype_length:
+        raise NichechainError(
+            f"the layers of {domain.name} have {sum(layers)} parameters together, "
+            f"but its genotypes have {domain.genotype_length}"
+        )
+    return layers
+
+
+def parse_step_bound(text: str, name: str = "step_bound") -> tuple[StepBound, float]:
+    """``"per-coordinate:2"`` as ``("per-coordinate", 2.0)``.
+
+    Raises
+    ------
+    NichechainError
+        If the text is no such thing.
+    """
+    kind, _, size = text.partition(":")
+    try:
+        bound = Bound(cast(StepBound, kind), float(size))
+    except (ValueError, NichechainError):
+        raise NichechainError(
+            f"{name} is {text!r}, but must be per-coordinate:SIZE or rescaled:SIZE with a positive "
+            "size, such as per-coordinate:2"
+        ) from None
+    return bound.kind, bound.size
+
+
+def parse_layer_scales(text: str, name: str = "layer_scales") -> tuple[float, ...]:
+    """``"1,0.5,0.5"`` as ``(1.0, 0.5, 0.5)``.
+
+    Raises
+    ------
+    NichechainError
+        If the text is no such thing.
+    """
+    try:
+        scales = tuple(float(part) for part in text.split(","))
+    except ValueError:
+        scales = ()
+    if not scales or not all(0 < scale < float("inf") for scale in scales):
+        raise NichechainError(
+            f"{name} is {text!r}, but must be positive numbers, one per layer, such as 1,0.5,0.5"
+        )
+    return scales

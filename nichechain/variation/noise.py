@@ -8,8 +8,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
-from nichechain.core.checks import check_numbers
-from nichechain.core.errors import NichechainError
+from nichechain.core.checks import check_positive
 
 Floats = NDArray[np.float64]
 
@@ -90,9 +89,7 @@ class StudentTNoise:
     df: float = 3.0
 
     def __post_init__(self) -> None:
-        check_numbers(df=self.df)
-        if not (np.isfinite(self.df) and self.df > 0):
-            raise NichechainError(f"df is {self.df:g}, but degrees of freedom are a positive number")
+        check_positive(df=self.df)
 
     def __call__(self, rng: np.random.Generator, n: int) -> Floats:
         """One step, (n,)."""

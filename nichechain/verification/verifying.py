@@ -12,7 +12,7 @@ import numpy as np
 from nichechain.archive import read
 from nichechain.archive.archive import Archive, load
 from nichechain.births.table import Offspring
-from nichechain.core.checks import check_seed, check_whole
+from nichechain.core.checks import check_at_least, check_seed
 from nichechain.core.errors import NichechainError
 from nichechain.core.machine import library_versions, machine
 from nichechain.core.randomness import Purpose, keyed
@@ -22,10 +22,9 @@ from nichechain.execution.base import WORKER_DIED
 from nichechain.search.elites import Elites
 from nichechain.search.making import make_niches
 from nichechain.verification import record
-from nichechain.verification.evaluations import check_evaluations, evaluated
-from nichechain.verification.replay import Regrowth
+from nichechain.verification.record import Births, Ints, Run, largest_difference, runs_of
+from nichechain.verification.replay import Regrowth, check_evaluations, evaluated
 from nichechain.verification.result import EVALUATION, SEARCH, Check, Difference, Verification
-from nichechain.verification.runs import Births, Ints, Run, largest_difference, runs_of
 from nichechain.verification.search import check_pending_again, check_search, check_winners, search_again
 
 
@@ -87,9 +86,7 @@ def verify(
     with probability 1 - C(N - k, n) / C(N, n), about 1 - (1 - n/N)^k.
     """
     if sample is not None:
-        check_whole(sample=sample)
-    if sample is not None and sample < 0:
-        raise NichechainError(f"sample is {sample}, but must not be negative")
+        check_at_least(0, sample=sample)
     check_seed(seed)
     archive = archive if isinstance(archive, Archive) else load(archive)
     with ExitStack() as stack:
@@ -192,7 +189,7 @@ class _Work:
             self.checks.append(Check(f"the search can be made again ({error})", "search", 1, 1))
             return
         self.checks += check_search(births, Births.concatenate([again.births for again in made]))
-        winners = _winners([again.state.elites for again in made])
+        winners = Elites.concatenate([again.state.elites for again in made]).winners()
         self.checks += check_winners(self.archive.elites, winners)
         if self.archive.meta.origin is None:
             self.checks += check_pending_again(pending, made[0].state.pending)
@@ -269,13 +266,3 @@ def _check_domain(archive: Archive, domain: Domain) -> Check:
         apart,
         EVALUATION,
     )
-
-
-def _winners(elites: list[Elites]) -> Elites:
-    """Of every niche, the elite with the largest key among runs; of equal keys, that of the first."""
-    pooled = elites[0]
-    for more in elites[1:]:
-        pooled = Elites.concatenate(pooled, more)
-    pooled = pooled[np.lexsort((pooled.uid, -pooled.key, pooled.niche))]
-    _, first = np.unique(pooled.niche, return_index=True)
-    return pooled[first]

@@ -335,7 +335,7 @@ def test_configurations_that_do_not_go_on(
     [
         ({"domain": "ant"}, "domain is 'ant'"),
         ({"mutation": "levy"}, "mutation is 'levy'"),
-        ({"scale": 0.0}, "mutation scale is 0.0"),
+        ({"scale": 0.0}, "scale is 0.0"),
         ({"shape": (9,)}, "grid has 1 axes but bounds have 2"),
         ({"shape": (9, 0)}, "every axis needs at least 1 cell"),
         ({"bounds": ((0.0, 0.0), (0.0, 1.0))}, "bounds are 0 to 0"),

@@ -166,7 +166,7 @@ def test_help(capsys):
         (["pressure", "arm", "--domain-seed", "-1"], "seed is -1"),
         (["pressure", "arm", "--scale", "inf"], "scale is inf"),
         (["pressure", "arm", "--mutation", "jump"], "mutation is 'jump'"),
-        (["pressure", "arm", "--archive-limit", "0"], "archive limit is 0"),
+        (["pressure", "arm", "--archive-limit", "0"], "archive_limit is 0"),
         (["pressure", "arm", "--initialisation", "zeros"], "initialisation is 'zeros'"),
         (["pressure", "arm", "--initialisation", "orthogonal"], "arm has no fully connected network"),
         (["pressure", "arm", "--grid", "4"], "arm has 2 axes"),

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import base64
 import json
-import os
 from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
@@ -24,6 +23,7 @@ from nichechain.chain.operator import PooledTransition
 from nichechain.chain.structure.graph import LONG_JUMP
 from nichechain.chain.structure.wormholes import wormholes
 from nichechain.core.errors import NichechainError
+from nichechain.core.files import write_atomically
 from nichechain.evolvability.coverage import coverage_by_generation
 from nichechain.evolvability.question import Question
 from nichechain.evolvability.returns import all_return_probabilities
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 
-__all__ = ["LONGEST", "explorer_page", "write_explorer"]
+__all__ = ["LONGEST", "write_explorer"]
 
 LONGEST = 10
 """Generations that the page's slider goes up to."""
@@ -80,15 +80,7 @@ def write_explorer(
         If a number is out of range, behavior does not have two axes, or there are too many niches.
     """
     text = explorer_page(archive, chain, l=l, lineages=lineages, draws=draws, seed=seed)
-    part = out.with_name(out.name + ".tmp")
-    try:
-        with part.open("w", encoding="utf-8", newline="\n") as file:
-            file.write(text)
-            file.flush()
-            os.fsync(file.fileno())
-        part.replace(out)
-    finally:
-        part.unlink(missing_ok=True)
+    write_atomically(out, text.encode())
 
 
 def explorer_page(
