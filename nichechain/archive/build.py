@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -15,6 +16,7 @@ from nichechain.core.errors import ArchiveError
 from nichechain.core.files import writing
 from nichechain.domains.base import Domain
 from nichechain.execution import Executor
+from nichechain.search import savings
 from nichechain.search.config import MOST_FAILED, BuildConfig
 from nichechain.search.failures import Failures, check_first_batch
 from nichechain.search.making import make_domain, make_mutation, make_niches
@@ -108,6 +110,7 @@ def build(
         else:
             niches = make_niches(config)
         search = MapElites(domain, niches, mutate, config, state, scores)
+        search.savings = savings.read(folder) if state is not None else search.savings
         writer = write.Writer(folder, config, read.DomainFacts.of(domain), niches=niches)
 
         under_way = 0
@@ -117,6 +120,12 @@ def build(
             under_way += done
             if on_progress is not None:
                 on_progress(BuildProgress(search.births + under_way, search.filled, outside, failures.failed))
+
+        def commit() -> None:
+            writer.commit(search.state)
+            # Of no consequence where it cannot be written.
+            with suppress(OSError):
+                savings.write(folder, search.savings)
 
         last_commit = time.monotonic()
         pause = CHECKPOINT_SECONDS
@@ -137,7 +146,7 @@ def build(
                 tell()
                 if time.monotonic() - last_commit > pause:
                     began = time.monotonic()
-                    writer.commit(search.state)
+                    commit()
                     last_commit = time.monotonic()
                     # Many large genotypes take a while to write.
                     pause = max(CHECKPOINT_SECONDS, (last_commit - began) / _COMMIT_SHARE)
@@ -145,7 +154,7 @@ def build(
             # An interrupt between two halves of a step leaves nothing to commit; the last commit
             # is at most half a minute old.
             if search.settled and search.births == writer.births > 0:
-                writer.commit(search.state)
+                commit()
 
 
 def _count(rows: pa.Table, state: int) -> int:

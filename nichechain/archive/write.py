@@ -51,6 +51,7 @@ from nichechain.core.errors import ArchiveError
 from nichechain.core.files import write_atomically
 from nichechain.core.machine import library_versions, machine
 from nichechain.niches import CVTNiches, Niches
+from nichechain.search import savings
 from nichechain.search.config import BuildConfig
 from nichechain.search.elites import SearchState
 
@@ -213,6 +214,7 @@ def clear(folder: Path) -> None:
     """Remove an archive's files from a folder, and nothing else."""
     (folder / META).unlink(missing_ok=True)
     (folder / f"{META}.tmp").unlink(missing_ok=True)
+    (folder / savings.FILE).unlink(missing_ok=True)
     for pattern in ("elites-*.npz*", f"{CENTROIDS}*", f"{BIRTHS}/part-*.parquet*"):
         for path in folder.glob(pattern):
             path.unlink()

@@ -78,6 +78,7 @@ class BuildCommand(SearchConfig):
     options: Annotated[tuple[str, ...], parsing.option("NAME=VALUE ...", "none")] = ()
     """Further options of the domain, such as joints=20 of the arm."""
     workers: parsing.Workers = None
+    cache_memory: parsing.CacheMemory = None
     max_failed: float = MOST_FAILED
     """Share of births that may fail, from 0 to 1, before the build is stopped."""
     out: Annotated[Path | None, parsing.option("PATH", "archives/DOMAIN-seedSEED")] = None
@@ -185,7 +186,7 @@ def run(arguments: Sequence[str]) -> int:
         command = parsing.parse(BuildCommand, arguments, default=BuildCommand.of(stored.config))
     config = command.config()
     shown = output.console()
-    with execution.make(command.workers) as executor:
+    with execution.make(command.workers, command.cache_memory) as executor:
         if command.force and folder.exists():
             with writing(folder):
                 write.clear(folder)
@@ -221,6 +222,7 @@ def _report(folder: Path, shown: object) -> None:
 
     from nichechain.archive.archive import load
     from nichechain.evolvability import DRAWS, niche_evolvability
+    from nichechain.search import savings
 
     assert isinstance(shown, Console)
     archive = load(folder)
@@ -237,6 +239,7 @@ def _report(folder: Path, shown: object) -> None:
         "births": f"{births}, {counts.births_outside} of them outside the grid"
         + (f", {failed} failed" if failed else ""),
         "rows of T observed": f"{counts.rows_observed} of {n}",
+        **output.physics(savings.read(folder)),
         "archive": str(folder),
     }
     shown.print()

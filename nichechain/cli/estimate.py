@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from nichechain.validation.stability import RankStability
 
 
-
 @dataclass(frozen=True)
 class EstimateCommand:
     """The estimate of T from births; which estimator foretells births best; whether they are enough."""

@@ -60,6 +60,7 @@ class EvolvabilityCommand:
     """Seed of draws, simulations and offspring."""
     workers: Annotated[str | None, parsing.option("WORKERS", "one thread per processor")] = None
     """Who evaluates an elite's offspring: a number of threads, processes:N, ray or ray://HOST:PORT."""
+    cache_memory: parsing.CacheMemory = None
     format: Literal["table", "csv", "json"] = "table"
     """How to write it."""
 
@@ -130,7 +131,7 @@ def _one(command: EvolvabilityCommand, archive: Archive, chain: NicheChain) -> p
         elite = archive.elite(parse_niche(command.elite, "--elite"))
         state = elite.state
         with (
-            execution.make(command.workers) as executor,
+            execution.make(command.workers, command.cache_memory) as executor,
             progress.spinner("evaluating the elite's offspring"),
         ):
             result = genotype_evolvability(

@@ -58,6 +58,7 @@ class LandscapeCommand:
     seed: int = 0
     """Seed of the offspring, of the sample of elites and of posterior draws."""
     workers: parsing.Workers = None
+    cache_memory: parsing.CacheMemory = None
     out: Annotated[Path | None, parsing.option("FILE", "NAME-landscape.csv")] = None
     """Table to write, .csv or .parquet; beside it the summary (.json) and the maps (.png)."""
     resume: bool = False
@@ -104,7 +105,7 @@ def run(arguments: Sequence[str]) -> int:
     measured = len(archive.elites) if command.elites is None else min(command.elites, len(archive.elites))
     total = measured * (1 + command.offspring)
     shown = output.console()
-    with execution.make(command.workers) as executor:
+    with execution.make(command.workers, command.cache_memory) as executor:
         try:
             with progress.adding(total, "evaluations") as tell:
                 found = measure_archive(

@@ -32,6 +32,15 @@ Workers: TypeAlias = Annotated[
         help_behavior_hint="(default: one thread per processor)",
     ),
 ]
+CacheMemory: TypeAlias = Annotated[
+    str | None,
+    tyro.conf.arg(
+        metavar="SIZE",
+        help="Memory on each machine for physics that was computed before, such as 500MB, or 0 for none. "
+        "The result is the same.",
+        help_behavior_hint="(default: 2GiB)",
+    ),
+]
 
 
 def parse(

@@ -31,6 +31,7 @@ class ValidateCommand:
     seed: int = 0
     """Seed of the choice of elites, of their lineages, of permutations and of draws."""
     workers: parsing.Workers = None
+    cache_memory: parsing.CacheMemory = None
     out: Annotated[Path | None, parsing.option("DIR", "NAME-validation")] = None
     """Folder for validation.json, calibration.png and lineages.csv."""
 
@@ -54,7 +55,7 @@ def run(arguments: Sequence[str]) -> int:
     if out.exists() and not out.is_dir():
         raise NichechainError(f"--out is {str(out)!r}, but that is a file, not a folder")
     with (
-        execution.make(command.workers) as executor,
+        execution.make(command.workers, command.cache_memory) as executor,
         progress.adding(config.evaluations, "evaluations") as tell,
     ):
         result = validate(archive, executor, config, on_done=tell)

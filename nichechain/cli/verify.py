@@ -41,6 +41,7 @@ class VerifyCommand:
     seed: int = 0
     """Seed of the choice of these."""
     workers: parsing.Workers = None
+    cache_memory: parsing.CacheMemory = None
     strict: bool = False
     """Exit with status 1 whatever the cause of a difference."""
     json: bool = False
@@ -57,7 +58,7 @@ def run(arguments: Sequence[str]) -> int:
     sample = _sample(command.sample)
     archive = load(command.path)
     began = time.monotonic()
-    with execution.make(command.workers) as executor, progress.stages() as tell:
+    with execution.make(command.workers, command.cache_memory) as executor, progress.stages() as tell:
         result = verify(
             archive,
             sample=sample,

@@ -93,6 +93,7 @@ class _Walks:
     options: Annotated[tuple[str, ...], parsing.option("NAME=VALUE ...", "none")] = ()
     """Options of the domain, such as joints=20 of the arm, or descriptor=final-xy of a gym:ENV_ID."""
     workers: parsing.Workers = None
+    cache_memory: parsing.CacheMemory = None
 
     def base(self) -> Condition:
         """What all conditions share."""
@@ -167,6 +168,7 @@ class ResumeCommand:
     runs: Annotated[int | None, parsing.option("INT", "as many as were asked for")] = None
     """Walks of each kind."""
     workers: parsing.Workers = None
+    cache_memory: parsing.CacheMemory = None
 
 
 @dataclass(frozen=True)
@@ -203,7 +205,7 @@ def _begin(command: PressureCommand | MetricsCommand | SensitivityCommand, kind:
 
     options = parsing.domain_options(command.options)
     domain = domains.make(command.domain, seed=command.domain_seed, **options)
-    return _walk(_study(command, kind, domain, options), domain, command.out, command.workers)
+    return _walk(_study(command, kind, domain, options), domain, command.out, command)
 
 
 def _resume(command: ResumeCommand) -> int:
@@ -216,14 +218,14 @@ def _resume(command: ResumeCommand) -> int:
     check_trusted(same, command.path)
     if command.runs is not None:
         study = replace(study, runs=command.runs)
-    return _walk(study, study.make_domain(), command.path, command.workers)
+    return _walk(study, study.make_domain(), command.path, command)
 
 
-def _walk(study: Study, domain: Domain, folder: Path, workers: str | None) -> int:
+def _walk(study: Study, domain: Domain, folder: Path, command: _Walks | ResumeCommand) -> int:
     from nichechain import execution
     from nichechain.studies.running import run as walk_study
 
-    with execution.make(workers) as executor:
+    with execution.make(command.workers, command.cache_memory) as executor:
         with progress.spinner("loading the domain"):
             domain.evaluate(domain.sample(1, seed=0))
         try:

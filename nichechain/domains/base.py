@@ -34,6 +34,9 @@ class Evaluation:
     spread : (N, B) float64 array, optional
         Standard deviation of behavior over the repeats of an evaluation, where a domain repeats
         them; NaN in the rows that failed.
+    steps, known : int
+        Steps of the episodes behind it, and how many of them were known from earlier episodes, where
+        a domain keeps count. What was known depends on what was evaluated before; the rows do not.
     """
 
     behavior: Floats
@@ -41,6 +44,8 @@ class Evaluation:
     failed: NDArray[np.bool_]
     reasons: tuple[str, ...]
     spread: Floats | None = None
+    steps: int = 0
+    known: int = 0
 
     def __len__(self) -> int:
         return len(self.objective)
@@ -60,6 +65,8 @@ class Evaluation:
             np.concatenate([part.failed for part in parts]),
             tuple(reason for part in parts for reason in part.reasons),
             spread,
+            sum(part.steps for part in parts),
+            sum(part.known for part in parts),
         )
 
 

@@ -23,6 +23,7 @@ from nichechain.niches import Niches
 from nichechain.search.config import BuildConfig
 from nichechain.search.elites import EliteArchive, Elites, SearchState
 from nichechain.search.parents import CuriosityScores, draw_curious
+from nichechain.search.savings import Savings
 from nichechain.variation import Mutation
 
 
@@ -46,6 +47,8 @@ class MapElites:
         Births so far.
     step : int
         The last step begun, -1 before the first.
+    savings : Savings
+        How much physics the births so far were spared, as far as they were evaluated here.
     settled : bool
         Whether the state is that after a finished batch, not in the middle of keeping one.
 
@@ -75,6 +78,7 @@ class MapElites:
         self._pending = Offspring.none(domain.genotype_length)
         self.births = 0
         self.step = -1
+        self.savings = Savings()
         self.settled = True
         if state is not None:
             self._archive.add(state.elites)
@@ -129,6 +133,7 @@ class MapElites:
         self._pending = waiting[limit:]
         self.step = step
         self.births += len(offspring)
+        self.savings = self.savings.and_of(evaluation)
         rows = self._keep(offspring, evaluation)
         self.settled = True
         return rows

@@ -24,6 +24,7 @@ _REAL = ("three", "")
 _POSITIVE = ("0", "-1", "nan", "inf", *_REAL)
 _SHARE = ("-0.1", "1.1", "nan", *_REAL)
 _UNKNOWN = ("no-such-thing", "3", "")
+_MEMORY = ("-1", "two", "2TB", "1.5.2GB", "")
 _WORKERS = ("0", "-1", "three", "threads:0", "processes:x", "ray:x")
 _NICHE = ("9,9", "-1", "a", "0,", "0;0", "1,2,3", "999", "")
 _GRID = ("0x2", "2", "axb", "2x", "-1x2", "1000000x1000000", "2x2x2", "")
@@ -53,6 +54,7 @@ _WALKS: dict[str, Sequence[str]] = {
     "options": ("joints", "joints=0", "no_such_option=3", "=3"),
     "steps": _NATURAL,
     "workers": _WORKERS,
+    "cache_memory": _MEMORY,
 }
 _LEVEL = ("no-such-thing", "2", "0", "-0.5", "nan")
 _KDE = {"bandwidth": _POSITIVE, "mode": _UNKNOWN, "decay": ("0", "1.1", "nan", *_REAL)}
@@ -88,6 +90,7 @@ TABLE: tuple[tuple[str, str, tuple[str, ...], Bad], ...] = (
             "repeats": _COUNT,
             "options": ("joints", "joints=0", "no_such_option=3", "=3", "joints=1.5"),
             "workers": _WORKERS,
+            "cache_memory": _MEMORY,
             "max_failed": _SHARE,
             "out": ("{archive}", "{archive}/meta.json"),
         },
@@ -159,7 +162,12 @@ TABLE: tuple[tuple[str, str, tuple[str, ...], Bad], ...] = (
             **_SCORES,
         },
     ),
-    ("evolvability", "EvolvabilityCommand", ("{archive}", "--elite", "{niche}"), {"workers": _WORKERS}),
+    (
+        "evolvability",
+        "EvolvabilityCommand",
+        ("{archive}", "--elite", "{niche}"),
+        {"workers": _WORKERS, "cache_memory": _MEMORY},
+    ),
     (
         "explore",
         "ExploreCommand",
@@ -207,6 +215,7 @@ TABLE: tuple[tuple[str, str, tuple[str, ...], Bad], ...] = (
             "by": _UNKNOWN,
             "map": ("no-such-thing", "ratio,no-such-thing", ""),
             "workers": _WORKERS,
+            "cache_memory": _MEMORY,
             "out": ("/no/such/folder/table.csv", "{archive}"),
             **_SCORES,
         },
@@ -267,6 +276,7 @@ TABLE: tuple[tuple[str, str, tuple[str, ...], Bad], ...] = (
             "elites": ("2", *_COUNT),
             "permutations": _COUNT,
             "workers": _WORKERS,
+            "cache_memory": _MEMORY,
             "out": ("{archive}/meta.json",),
             **_SCORES,
         },
@@ -280,6 +290,7 @@ TABLE: tuple[tuple[str, str, tuple[str, ...], Bad], ...] = (
             "sample": ("-1", "1.5", "some", ""),
             "seed": _NATURAL,
             "workers": _WORKERS,
+            "cache_memory": _MEMORY,
         },
     ),
     (
@@ -317,7 +328,12 @@ TABLE: tuple[tuple[str, str, tuple[str, ...], Bad], ...] = (
         ("arm", "--out", "{fresh}", "--vary", "k", "--metric", "kde", "--runs", "2", "--steps", "1"),
         {**_KDE, "scale": _POSITIVE},
     ),
-    ("walks resume", "ResumeCommand", ("{study}",), {"path": _PATH, "runs": _COUNT, "workers": _WORKERS}),
+    (
+        "walks resume",
+        "ResumeCommand",
+        ("{study}",),
+        {"path": _PATH, "runs": _COUNT, "workers": _WORKERS, "cache_memory": _MEMORY},
+    ),
     ("walks report", "ReportCommand", ("{study}",), {"path": _PATH}),
 )
 

@@ -222,7 +222,7 @@ EXEMPT: dict[tuple[str, str], str] = {
             "options",
             "tried one by one: joints, noise, repeats, and one that is not there",
         ),
-        ("execution.ray.Ray", "address", _LATER),
+        ("execution.ray.Ray", "address cache_memory", _LATER),
         ("studies.running.is_study", "folder", "asks whether there is one: any path has an answer"),
         ("studies.running.run", "folder", _LATER),
         ("studies.study.Study", "domain domain_options", _LATER),
