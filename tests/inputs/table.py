@@ -179,7 +179,8 @@ _ALLOWED = re.compile(
     r"|-?\d+ to -?\d+|runs? from|has \(?\d+|have \d+: one|its? \w+ is|numbered from"
     # Of what kind values are not, and to what else a parameter belongs.
     r"|that are (no|not|negative)|which|belongs? to|nothing|no spread|neither|are missing"
-    r"|has no|it has|the last is|up to|one to \d+|but \d+ axes|one scale per|not finite|either|differ|not negative)\b"
+    r"|has no|it has|the last is|up to|one to \d+|but \d+ axes|one scale per"
+    r"|not finite|either|differ|not negative|would be empty)\b"
 )
 """Words that say what would do instead."""
 
