@@ -13,6 +13,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from nichechain.births.families import elites_of, redrawn
 from nichechain.chain.base_measure import BaseMeasure
 from nichechain.chain.counts import TransitionCounts
 from nichechain.chain.estimators import estimate, refitted, with_posterior
@@ -176,41 +177,19 @@ def bootstrap_elites(
     assert fitted is not None
 
     value = answer_for_niches(_chain(fitted), replace(question, draws=DRAWS)).value
-    elites = _Elites(counts)
+    families = families_of(counts)
+    elite = elites_of(families)
+
+    def again_with(rng: np.random.Generator) -> Floats:
+        others = counts_of_families(redrawn(families, elite, rng), counts)
+        return answer_for_niches(_chain(refitted(fitted, others)), question).value
+
     again = np.array(
-        [
-            answer_for_niches(
-                _chain(refitted(fitted, elites.resampled(keyed(seed, Purpose.RESAMPLING, number)))), question
-            ).value
-            for number in range(resamples)
-        ]
+        [again_with(rng) for rng in (keyed(seed, Purpose.RESAMPLING, number) for number in range(resamples))]
     )
     low, high = value + np.quantile(again, _INTERVAL, axis=0, method="weibull") - np.median(again, axis=0)
     niches = len(counts.niches)
     return NicheBand("bootstrap over elites", value, np.maximum(low, 0.0), np.minimum(high, niches))
-
-
-class _Elites:
-    """Births by the elites whose children they are, elites by their niche."""
-
-    def __init__(self, counts: TransitionCounts) -> None:
-        self._counts = counts
-        self.families_of = families_of(counts)
-        owners, number = np.unique(self.families_of[:, :2], axis=0, return_inverse=True)
-        self._elite: Ints = number.ravel().astype(np.int64)
-        # Elites come sorted by state, so those of one state have numbers in a row.
-        _, first, where, size = np.unique(
-            owners[:, 0], return_index=True, return_inverse=True, return_counts=True
-        )
-        self._first = first[where.ravel()]
-        self._size = size[where.ravel()]
-
-    def resampled(self, rng: np.random.Generator) -> TransitionCounts:
-        """Counts with as many elites in every niche, drawn from its own with replacement."""
-        drawn = self._first + rng.integers(self._size)
-        families = self.families_of.copy()
-        families[:, 3] *= np.bincount(drawn, minlength=drawn.size)[self._elite]
-        return counts_of_families(families, self._counts)
 
 
 def _only(base: BaseMeasure, weights: Floats) -> BaseMeasure:
