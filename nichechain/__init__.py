@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from nichechain._version import __version__ as __version__
-from nichechain.core.lazy import lazy
+from nichechain.core.lazy import lazily
 
 if TYPE_CHECKING:
     from nichechain import domains, landscape, studies, variation, walks
@@ -33,42 +33,6 @@ if TYPE_CHECKING:
     from nichechain.search import BuildConfig, curiosity
     from nichechain.verification import Verification, verify
     from nichechain.walks import walk
-
-_HOMES = {
-    "Archive": "archive",
-    "ArchiveError": "core",
-    "BuildConfig": "search",
-    "CVTNiches": "niches",
-    "Elite": "archive",
-    "Evolvability": "evolvability",
-    "GridNiches": "niches",
-    "NicheBand": "evolvability",
-    "NicheChain": "chain",
-    "NicheEvolvability": "evolvability",
-    "NichechainError": "core",
-    "Niches": "niches",
-    "Threads": "execution",
-    "TransitionCounts": "chain",
-    "Verification": "verification",
-    "bootstrap_elites": "evolvability",
-    "build": "archive",
-    "curiosity": "search",
-    "domains": "domains",
-    "estimate": "chain",
-    "from_ribs": "pyribs",
-    "genotype_evolvability": "evolvability",
-    "l_evolvability": "evolvability",
-    "landscape": "landscape",
-    "load": "archive",
-    "niche_evolvability": "evolvability",
-    "one_hot": "niches",
-    "prior_sensitivity": "evolvability",
-    "studies": "studies",
-    "variation": "variation",
-    "verify": "verification",
-    "walk": "walks",
-    "walks": "walks",
-}
 
 __all__ = [
     "Archive",
@@ -106,4 +70,22 @@ __all__ = [
     "walks",
 ]
 
-__getattr__, __dir__ = lazy(__name__, _HOMES)
+# NumPy, SciPy and pandas take half a second.
+__getattr__, __dir__ = lazily(
+    __name__,
+    archive="Archive Elite build load",
+    chain="NicheChain TransitionCounts estimate",
+    core="ArchiveError NichechainError",
+    domains="domains",
+    evolvability="Evolvability NicheBand NicheEvolvability bootstrap_elites genotype_evolvability "
+    "l_evolvability niche_evolvability prior_sensitivity",
+    execution="Threads",
+    landscape="landscape",
+    niches="CVTNiches GridNiches Niches one_hot",
+    pyribs="from_ribs",
+    search="BuildConfig curiosity",
+    studies="studies",
+    variation="variation",
+    verification="Verification verify",
+    walks="walk walks",
+)

@@ -8,11 +8,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from nichechain.core.errors import ArchiveError, NichechainError
-from nichechain.core.lazy import lazy
+from nichechain.core.lazy import lazily
 
 if TYPE_CHECKING:
     from nichechain.core.randomness import Purpose, keyed
 
 __all__ = ["ArchiveError", "NichechainError", "Purpose", "keyed"]
 
-__getattr__, __dir__ = lazy(__name__, {"Purpose": "randomness", "keyed": "randomness"})
+__getattr__, __dir__ = lazily(__name__, randomness="Purpose keyed")

@@ -1,30 +1,35 @@
-"""Names that a package imports when they are first used: NumPy, SciPy and pandas take half a second."""
+"""Names of a package that are imported when they are first used."""
 
 from __future__ import annotations
 
 import importlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Any
 
 
-def lazy(package: str, homes: Mapping[str, str]) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
-    """``__getattr__`` and ``__dir__`` of a package.
+def lazily(package: str, **homes: str) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
+    """What a package's ``__getattr__`` and ``__dir__`` are, so that importing it costs nothing.
 
     Parameters
     ----------
     package : str
-        Its full name.
-    homes : mapping
-        For each public name the module of the package that has it; a module itself goes by its name.
+    **homes
+        Names, with spaces between them, by the module of the package that they are in. A module is in itself.
+
+    Returns
+    -------
+    two callables
     """
+    modules = {
+        name: f"{package}.{home.replace('__', '.')}"
+        for home, names in homes.items()
+        for name in names.split()
+    }
 
-    def get(name: str) -> Any:
-        if name not in homes:
+    def getattribute(name: str) -> Any:
+        if name not in modules:
             raise AttributeError(f"module {package!r} has no attribute {name!r}")
-        home = importlib.import_module(f"{package}.{homes[name]}")
-        return home if name == homes[name] else getattr(home, name)
+        home = importlib.import_module(modules[name])
+        return home if modules[name] == f"{package}.{name}" else getattr(home, name)
 
-    def names() -> list[str]:
-        return sorted(homes)
-
-    return get, names
+    return getattribute, lambda: list(modules)

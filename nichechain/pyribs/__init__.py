@@ -21,7 +21,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from nichechain.core.lazy import lazy
+from nichechain.core.lazy import lazily
 from nichechain.pyribs.conversion import from_ribs, to_ribs
 from nichechain.pyribs.recording import Recording, record
 
@@ -31,4 +31,4 @@ if TYPE_CHECKING:
 __all__ = ["MutationEmitter", "Recording", "from_ribs", "record", "to_ribs"]
 
 # An emitter is a class of pyribs, whose import takes seconds.
-__getattr__, __dir__ = lazy(__name__, {"MutationEmitter": "emitters"})
+__getattr__, __dir__ = lazily(__name__, emitters="MutationEmitter")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from nichechain.core.lazy import lazy
+from nichechain.core.lazy import lazily
 from nichechain.search.config import MOST_FAILED, BuildConfig
 
 if TYPE_CHECKING:
@@ -22,13 +22,6 @@ __all__ = [
 ]
 
 # The command line reads BuildConfig, and its help waits for no NumPy.
-__getattr__, __dir__ = lazy(
-    __name__,
-    {
-        "check_niches": "making",
-        "curiosity": "parents",
-        "make_domain": "making",
-        "make_mutation": "making",
-        "make_niches": "making",
-    },
+__getattr__, __dir__ = lazily(
+    __name__, making="check_niches make_domain make_mutation make_niches", parents="curiosity"
 )
