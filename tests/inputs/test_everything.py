@@ -211,7 +211,7 @@ EXEMPT: dict[tuple[str, str], str] = {
         ("archive.imported.write_archive", "folder rows origin", _WITHIN),
         ("landscape.archives.measure_archive", "on_done", _WITHIN),
         ("search.making.make_niches", "centroids", _WITHIN),
-        ("plots.wormholes.plot_wormholes", "found", _WITHIN),
+        ("plots.graphs.plot_wormholes", "found", _WITHIN),
         ("evolvability.reach.visit_probability", "first steps", _WITHIN),
         ("search.parents.draw_curious", "scores size", _WITHIN),
         ("validation.grid_size.default_sizes", "axes", _WITHIN),
