@@ -209,7 +209,7 @@ def _stability(command: EstimateCommand, archive: Archive) -> None:
 
 
 def _draw(found: RankStability, out: Path) -> None:
-    from nichechain.plots.stability import plot_stability
+    from nichechain.plots.validation import plot_stability
 
     figure = output.new_figure(6.4, 4.8)
     plot_stability(found, figure.add_subplot())

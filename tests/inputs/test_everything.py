@@ -207,7 +207,7 @@ EXEMPT: dict[tuple[str, str], str] = {
         ("studies.running.run", "on_progress", _WITHIN),
         ("landscape.archives.measure_archive", "on_done", _WITHIN),
         ("search.making.make_niches", "centroids", _WITHIN),
-        ("plots.wormholes.plot_wormholes", "found", _WITHIN),
+        ("plots.graphs.plot_wormholes", "found", _WITHIN),
         ("evolvability.reach.visit_probability", "first steps", _WITHIN),
         ("validation.rollouts.sample_roots", "filled", _WITHIN),
         ("walks.state.record_table", "records", _WITHIN),
