@@ -8,7 +8,7 @@ from scipy import sparse
 
 from nichechain import NichechainError
 from nichechain.chain.structure import linear
-from nichechain.chain.structure.linear import solve_substochastic
+from nichechain.chain.structure.inside import solve_substochastic
 
 
 def _substochastic(size, per_row, leak, seed=0):
