@@ -62,6 +62,12 @@ def estimate(
     NichechainError
         If an argument is unknown or belongs to another estimator.
     """
+    if not isinstance(counts, TransitionCounts):
+        raise NichechainError(
+            f"counts is of type {type(counts).__name__}, but must be TransitionCounts: "
+            "TransitionCounts.from_matrix makes them of a matrix of counts, "
+            "and NicheChain(T) takes a matrix of probabilities"
+        )
     if estimator not in ESTIMATORS:
         raise NichechainError(f"estimator is {estimator!r}, but must be one of {', '.join(ESTIMATORS)}")
     if estimator == "mle":
