@@ -86,7 +86,9 @@ class TransitionCounts:
         """
         if hasattr(parent, "columns"):
             if not isinstance(child, Niches) or niches is not None or elite is not None:
-                raise NichechainError("a table of births comes with its niches alone: from_births(births, niches)")
+                raise NichechainError(
+                    "a table of births comes with its niches alone: from_births(births, niches)"
+                )
             return cls._from_table(parent, child)
         if niches is None:
             raise NichechainError("niches are missing: from_births(parent, child, niches)")
@@ -176,7 +178,8 @@ class TransitionCounts:
                 f"but these niches have {niches.states} states"
             )
         entries = sparse.coo_array(matrix)
-        return cls.from_pairs(*entries.coords, niches, n=entries.data)
+        parent, child = entries.coords
+        return cls.from_pairs(parent, child, niches, n=entries.data)
 
     @classmethod
     def from_pairs(

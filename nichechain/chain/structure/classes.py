@@ -23,6 +23,7 @@ from nichechain.core.errors import NichechainError
 
 Ints = NDArray[np.int64]
 
+
 def communicating_classes(chain: NicheChain, *, threshold: float = 0.0) -> list[Ints]:
     """Sets of states that all lead to one another.
 

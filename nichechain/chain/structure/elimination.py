@@ -93,9 +93,7 @@ class Dense:
         """The x with x (I − Q) = b, for b (m,) that is not negative."""
         half = solve_triangular(self.factors, right, trans=1, check_finite=False)
         return np.asarray(
-            solve_triangular(
-                self.factors, half, trans=1, lower=True, unit_diagonal=True, check_finite=False
-            )
+            solve_triangular(self.factors, half, trans=1, lower=True, unit_diagonal=True, check_finite=False)
         )
 
     def visits(self) -> Floats:

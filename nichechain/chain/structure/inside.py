@@ -79,7 +79,7 @@ class Inside:
 
     @property
     def size(self) -> int:
-        """m."""
+        """M."""
         return self.states.size
 
     @cached_property
@@ -216,9 +216,7 @@ class Inside:
             everywhere[self.states] = values
             moved = everywhere @ self.onward if transposed else self.onward @ everywhere
             return values - moved[self.states]
-        product: Floats = self.rate * values - (
-            values @ self.onward if transposed else self.onward @ values
-        )
+        product: Floats = self.rate * values - (values @ self.onward if transposed else self.onward @ values)
         return product
 
 

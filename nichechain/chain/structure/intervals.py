@@ -100,8 +100,8 @@ def posterior_interval(
         answer = as_floats("the answer", question(drawn))
         if answers and answer.shape != answers[0].shape:
             raise NichechainError(
-                f"the answer has shape {answer.shape} for draw {number} and {answers[0].shape} for the first, "
-                "but must have one shape: ask about one root, or one target"
+                f"the answer has shape {answer.shape} for draw {number} and {answers[0].shape} for "
+                "the first, but must have one shape: ask about one root, or one target"
             )
         answers.append(answer)
     ordered = np.sort(answers, axis=0)

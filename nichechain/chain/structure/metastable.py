@@ -226,7 +226,7 @@ def _most(weight: Floats, chosen: NDArray[np.bool_]) -> int:
 
 @contextmanager
 def _silence() -> Iterator[None]:
-    """pyGPCCA warns where this module refuses, and turns on all warnings of the process for good."""
+    """PyGPCCA warns where this module refuses, and turns on all warnings of the process for good."""
     before = os.environ.get("PYTHONWARNINGS")
     with warnings.catch_warnings():
         try:

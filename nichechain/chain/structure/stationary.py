@@ -84,9 +84,11 @@ def long_run_distribution(chain: NicheChain, root: Target) -> Floats:
     first[start] = 1.0 / start.size
     rows = rows_of(chain)
     graph = graph_of(rows, chain)
-    near = reachable(graph, start, chain.states)
-    classes = [c for c in closed_classes_of(graph, chain.states) if np.isin(c[0], near)]
-    passing = np.setdiff1d(near, np.concatenate(classes))
+    near = np.zeros(chain.states, bool)
+    near[reachable(graph, start, chain.states)] = True
+    classes = [states for states in closed_classes_of(graph, chain.states) if near[states[0]]]
+    near[np.concatenate(classes)] = False
+    passing = np.flatnonzero(near)
     ends = first.copy()
     if passing.size:
         visits = Inside.of(rows, passing).solve_transposed(first[passing])

@@ -86,7 +86,10 @@ def implied_timescales(chain: NicheChain, k: int = 10) -> Floats:
     if k < 1:
         raise NichechainError(f"k is {k}, but at least 1 is needed")
     rows = _entries(chain)
-    closed = {int(states[0]): lasting for states, lasting in zip(recurrent_classes(chain), period(chain), strict=True)}
+    closed = {
+        int(states[0]): lasting
+        for states, lasting in zip(recurrent_classes(chain), period(chain), strict=True)
+    }
     classes = classes_of(rows, chain.states)
     _check_size(max(states.size for states in classes), "a class")
     decay = []

@@ -119,7 +119,7 @@ def wormholes(
     return frame
 
 
-def wormhole_exposure(chain: NicheChain, found: pd.DataFrame, *, l: int = 1) -> Floats:  # noqa: E741
+def wormhole_exposure(chain: NicheChain, found: pd.DataFrame, *, l: int = 1) -> Floats:
     """Probability that a lineage takes at least one wormhole.
 
     Parameters
@@ -167,7 +167,8 @@ def wormhole_exposure(chain: NicheChain, found: pd.DataFrame, *, l: int = 1) -> 
     for _ in range(l - 1):
         onward = rows @ exposure - ways @ exposure if others is None else others @ exposure
         exposure = taken + onward
-    return np.minimum(exposure, 1.0)
+    at_most_one: Floats = np.minimum(exposure, 1.0)
+    return at_most_one
 
 
 def _between_niches(counts: TransitionCounts) -> tuple[Ints, Ints, Ints]:
