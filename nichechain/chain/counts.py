@@ -179,7 +179,8 @@ class TransitionCounts:
             )
         entries = sparse.coo_array(matrix)
         parent, child = entries.coords
-        return cls.from_pairs(parent, child, niches, n=entries.data)
+        n = _multiplicities("matrix", entries.data, parent.shape)
+        return cls.from_pairs(parent, child, niches, n=n)
 
     @classmethod
     def from_pairs(
@@ -204,7 +205,7 @@ class TransitionCounts:
         """
         i, j = as_whole("parent", parent), as_whole("child", child)
         _check_pairs(i, j, niches, lowest=0)
-        size = np.ones(i.size, np.int64) if n is None else _multiplicities(n, i.shape)
+        size = np.ones(i.size, np.int64) if n is None else _multiplicities("n", n, i.shape)
         shape = (niches.states, niches.states)
         matrix = sparse.coo_array((size, (i, j)), shape=shape).tocsr()
         # A pair that stands for no birth is no transition.
@@ -223,7 +224,7 @@ class TransitionCounts:
         """
         if self.niches != other.niches:
             raise NichechainError(f"niches differ: {self.niches} and {other.niches}")
-        _check_total(float(self.births.sum()) + float(other.births.sum()))
+        _check_total("the sum", float(self.births.sum()) + float(other.births.sum()))
         later = other.families.copy()
         if len(self.families):
             # Elites of two runs may bear the same number.
@@ -262,20 +263,22 @@ class TransitionCounts:
         return int(self.visits[len(self.niches) :].sum())
 
 
-def _multiplicities(n: ArrayLike, shape: tuple[int, ...]) -> Ints:
-    given = as_floats("n", n)
+def _multiplicities(name: str, n: ArrayLike, shape: tuple[int, ...]) -> Ints:
+    given = as_floats(name, n)
     if given.shape != shape:
-        raise NichechainError(f"n has shape {given.shape}, but must have {shape}, one number for each pair")
+        raise NichechainError(
+            f"{name} has shape {given.shape}, but must have {shape}, one number for each pair"
+        )
     if not (np.isfinite(given).all() and (given >= 0).all() and (given == np.floor(given)).all()):
-        raise NichechainError("n has numbers that are negative or no whole numbers, but counts births")
-    _check_total(float(given.sum()))
+        raise NichechainError(f"{name} has numbers that are negative or no whole numbers, but counts births")
+    _check_total(name, float(given.sum()))
     return given.astype(np.int64)
 
 
-def _check_total(births: float) -> None:
+def _check_total(name: str, births: float) -> None:
     """Refuse more births than floating-point numbers, and sums of whole ones, can count."""
     if births > _MOST_BIRTHS:
-        raise NichechainError(f"n sums to {births:.3g} births, but at most 2**53 can be counted")
+        raise NichechainError(f"{name} is {births:.3g} births in all, but at most 2**53 can be counted")
 
 
 def _states(name: str, values: Any) -> Ints:

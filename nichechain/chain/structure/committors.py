@@ -157,7 +157,7 @@ def reactive_flux(chain: NicheChain, source: Target, target: Target) -> Reactive
 
 def _apart(chain: NicheChain, source: Target, target: Target) -> tuple[Ints, Ints]:
     """States of both sets."""
-    start, end = states_of(chain, source), states_of(chain, target)
+    start, end = states_of(chain, source, "source"), states_of(chain, target)
     common = np.intersect1d(start, end)
     if common.size:
         raise NichechainError(

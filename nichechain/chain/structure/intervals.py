@@ -79,6 +79,8 @@ def posterior_interval(
     k / (n + 1) (Weibull 1939), which makes the interval hold its level also for few draws. The
     interval says what births leave open if the estimator's model is right.
     """
+    if not callable(question):
+        raise NichechainError(f"question is {question!r}, but must be a function of a chain")
     check_at_least(2, draws=draws)
     check_numbers(level=level)
     if not 0.0 < level < 1.0:

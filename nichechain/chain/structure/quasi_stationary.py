@@ -15,7 +15,7 @@ from nichechain.chain.structure.classes import recurrent_classes
 from nichechain.chain.structure.inside import Inside
 from nichechain.chain.structure.stationary import stationary_of
 from nichechain.chain.structure.targets import Target, states_of
-from nichechain.chain.structure.transitions import reachable
+from nichechain.chain.structure.transitions import leaving_alone, reachable
 from nichechain.core.errors import NichechainError
 
 Floats = NDArray[np.float64]
@@ -138,7 +138,7 @@ def decay(rows: sparse.csr_array, states: Ints) -> tuple[float, Floats]:
     """
     if states.size == 1:
         stays = rows[states[0], states[0]] > 0.0
-        return float(Inside.of(rows, states).leaving[0]) if stays else 1.0, np.ones(1)
+        return leaving_alone(rows, int(states[0])) if stays else 1.0, np.ones(1)
     inside = _Slowed.of(rows, states)
     if not inside.system.leaving.any():
         return 0.0, stationary_of(rows, states)

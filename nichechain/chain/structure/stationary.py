@@ -79,7 +79,7 @@ def long_run_distribution(chain: NicheChain, root: Target) -> Floats:
     NichechainError
         If there is no such niche.
     """
-    start = states_of(chain, root)
+    start = states_of(chain, root, "root")
     first = np.zeros(chain.states)
     first[start] = 1.0 / start.size
     rows = rows_of(chain)

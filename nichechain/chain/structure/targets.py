@@ -19,8 +19,8 @@ Target: TypeAlias = Niche | Sequence[Niche] | NDArray[np.int64]
 goes by its number."""
 
 
-def states_of(chain: NicheChain, target: Target) -> Ints:
-    """Sorted states of a target.
+def states_of(chain: NicheChain, target: Target, name: str = "target") -> Ints:
+    """Sorted states of a target, which the caller knows by this name.
 
     Raises
     ------
@@ -35,7 +35,7 @@ def states_of(chain: NicheChain, target: Target) -> Ints:
         # A tuple is the index of one niche; what is no niche at all is for the chain to refuse.
         several = [target]
     if not several:
-        raise NichechainError("the target is empty, but must have at least one niche")
+        raise NichechainError(f"the {name} is empty, but must have at least one niche")
     return np.unique([state_of(chain, niche) for niche in several])
 
 

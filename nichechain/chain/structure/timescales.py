@@ -11,6 +11,7 @@ from nichechain.chain.structure.classes import classes_of, period, recurrent_cla
 from nichechain.chain.structure.elimination import Dense
 from nichechain.chain.structure.inside import Inside
 from nichechain.chain.structure.stationary import stationary_of
+from nichechain.chain.structure.transitions import leaving_alone
 from nichechain.core.checks import check_whole
 from nichechain.core.errors import NichechainError
 
@@ -48,6 +49,9 @@ def kemeny_constant(chain: NicheChain) -> Floats:
     rows = _entries(chain)
     found = []
     for states in classes:
+        if states.size == 1:
+            found.append(0.0)
+            continue
         share = stationary_of(rows, states)
         times = passage_between_all(rows[states][:, states].toarray(), np.ones(states.size))
         # From the most visited state, whose row has the smallest numbers.
@@ -125,6 +129,8 @@ def gaps(rows: sparse.csr_array, states: Ints, *, closed: bool) -> Complexes:
     -------
     (c,) complex128 array
     """
+    if states.size == 1:
+        return np.array([0.0 if closed else leaving_alone(rows, int(states[0]))], np.complex128)
     inner = rows[states][:, states].toarray()
     gap = np.linalg.eigvals(np.eye(states.size) - inner).astype(np.complex128)
     gap = gap[np.argsort(np.abs(gap), kind="stable")]

@@ -68,6 +68,12 @@ def staying(chain: NicheChain) -> Floats:
     return stay
 
 
+def leaving_alone(rows: sparse.csr_array, state: int) -> float:
+    """Probability that a child is not in its parent's state."""
+    entries = slice(rows.indptr[state], rows.indptr[state + 1])
+    return float(rows.data[entries][rows.indices[entries] != state].sum())
+
+
 def graph_of(rows: Rows, chain: NicheChain) -> sparse.csr_array:
     """A graph with the paths of T between states: nodes 0 to S − 1 are the states.
 

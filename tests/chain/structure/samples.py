@@ -3,8 +3,8 @@
 from fractions import Fraction
 
 import numpy as np
-from scipy import sparse
 from hypothesis import strategies as st
+from scipy import sparse
 
 # 0 ⇄ 1 lead to the pair 3 ⇄ 4 and to 2, which nobody leaves; 5 leads to 0 only.
 MIXED = np.array(

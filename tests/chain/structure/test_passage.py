@@ -164,8 +164,8 @@ def test_a_ladder_that_is_hardly_ever_climbed():
 
 
 @pytest.mark.parametrize("top", [300, 5000, 72_000])
-def test_long_ladders_against_the_stream(top):
-    # From one level to the next it takes Σ (q/p)^k / p: less than 1 / (p − q) on the way up a gentle slope.
+def test_long_ladders(top):
+    # From level i to the next it takes Σ (q/p)^k / p for k = 0 … i.
     up = 0.51
     times = mean_first_passage_times(NicheChain(ladder(top, up)), top)
     odds = (1 - up) / up

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from hypothesis import given, settings
-from scipy import sparse
 
 from nichechain import NicheChain
 from nichechain.chain.structure.quasi_stationary import quasi_stationary_distribution
@@ -82,7 +81,9 @@ def test_a_set_that_is_hardly_ever_left():
         inner = mpmath.matrix(ladder(20, 0.1).toarray()[:20, :20].tolist())
         for i in range(20):
             # The diagonal as the floats off it say, the way out at the top included.
-            inner[i, i] = 1 - sum(inner[i, j] for j in range(20) if j != i) - (mpmath.mpf(0.1) if i == 19 else 0)
+            inner[i, i] = (
+                1 - sum(inner[i, j] for j in range(20) if j != i) - (mpmath.mpf(0.1) if i == 19 else 0)
+            )
         values, vectors = mpmath.eig(inner.T)
         best = max(range(20), key=lambda k: mpmath.re(values[k]))
         leaving = float(1 - mpmath.re(values[best]))
