@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -12,9 +13,10 @@ import pyarrow as pa
 
 from nichechain.archive import read, write
 from nichechain.core.errors import ArchiveError
-from nichechain.core.locking import writing
+from nichechain.core.files import writing
 from nichechain.domains.base import Domain
 from nichechain.execution import Executor
+from nichechain.search import savings
 from nichechain.search.config import MOST_FAILED, BuildConfig
 from nichechain.search.failures import Failures, check_first_batch
 from nichechain.search.making import make_domain, make_mutation, make_niches
@@ -26,7 +28,7 @@ _COMMIT_SHARE = 0.01
 
 
 @dataclass(frozen=True)
-class Progress:
+class BuildProgress:
     """How far a build is.
 
     Parameters
@@ -51,7 +53,7 @@ def build(
     executor: Executor,
     *,
     domain: Domain | None = None,
-    on_progress: Callable[[Progress], None] | None = None,
+    on_progress: Callable[[BuildProgress], None] | None = None,
     max_failed: float = MOST_FAILED,
 ) -> None:
     """Fill an archive folder, going on from what it holds.
@@ -108,6 +110,7 @@ def build(
         else:
             niches = make_niches(config)
         search = MapElites(domain, niches, mutate, config, state, scores)
+        search.savings = savings.read(folder) if state is not None else search.savings
         writer = write.Writer(folder, config, read.DomainFacts.of(domain), niches=niches)
 
         under_way = 0
@@ -116,7 +119,13 @@ def build(
             nonlocal under_way
             under_way += done
             if on_progress is not None:
-                on_progress(Progress(search.births + under_way, search.filled, outside, failures.failed))
+                on_progress(BuildProgress(search.births + under_way, search.filled, outside, failures.failed))
+
+        def commit() -> None:
+            writer.commit(search.state)
+            # Of no consequence where it cannot be written.
+            with suppress(OSError):
+                savings.write(folder, search.savings)
 
         last_commit = time.monotonic()
         pause = CHECKPOINT_SECONDS
@@ -124,7 +133,7 @@ def build(
         try:
             while search.births < config.evaluations:
                 failures.check(
-                    f"{folder} keeps them, and --resume with a larger --max-failed goes on from there"
+                    f"{folder} keeps them, and a build with a larger max_failed goes on from there"
                 )
                 first = search.births == 0
                 rows = search.advance(executor, config.evaluations - search.births, tell)
@@ -137,7 +146,7 @@ def build(
                 tell()
                 if time.monotonic() - last_commit > pause:
                     began = time.monotonic()
-                    writer.commit(search.state)
+                    commit()
                     last_commit = time.monotonic()
                     # Many large genotypes take a while to write.
                     pause = max(CHECKPOINT_SECONDS, (last_commit - began) / _COMMIT_SHARE)
@@ -145,7 +154,7 @@ def build(
             # An interrupt between two halves of a step leaves nothing to commit; the last commit
             # is at most half a minute old.
             if search.settled and search.births == writer.births > 0:
-                writer.commit(search.state)
+                commit()
 
 
 def _count(rows: pa.Table, state: int) -> int:

@@ -7,14 +7,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
 from nichechain.archive import read, write
 from nichechain.births.table import Offspring
 from nichechain.core.errors import ArchiveError, NichechainError
-from nichechain.core.locking import writing
+from nichechain.core.files import writing
 from nichechain.niches import Niches
 from nichechain.search.config import BuildConfig
 from nichechain.search.elites import Elites, SearchState
@@ -86,10 +85,9 @@ def merge(folders: Sequence[str | Path], out: str | Path) -> None:
         first_uid += meta.births
     births = pa.concat_tables(tables)
     config = replace(metas[0].config, evaluations=len(births))
-    none = np.empty(0, np.int64)
-    length = elites[0].genotype.shape[1]
-    pending = Offspring(np.empty((0, length), np.float32), none, none, none, none)
-    state = SearchState(_largest(elites), pending, len(births), max(meta.step for meta in metas))
+    pending = Offspring.none(elites[0].genotype.shape[1])
+    step = max(meta.step for meta in metas)
+    state = SearchState(Elites.concatenate(elites).winners(), pending, len(births), step)
     with writing(out):
         if read.is_archive(out):
             raise ArchiveError(f"{out} already holds an archive: merge into another folder")
@@ -157,13 +155,3 @@ def _renumbered(births: pa.Table, first_run: int, first_uid: int) -> pa.Table:
         moved = pc.add(births[name], pa.scalar(by, kind.type))
         births = births.set_column(births.schema.get_field_index(name), kind, moved)
     return births
-
-
-def _largest(elites: list[Elites]) -> Elites:
-    """Of every state, the elite with the largest key; of equal keys that with the smallest uid."""
-    pooled = elites[0]
-    for more in elites[1:]:
-        pooled = Elites.concatenate(pooled, more)
-    pooled = pooled[np.lexsort((pooled.uid, -pooled.key, pooled.niche))]
-    _, first = np.unique(pooled.niche, return_index=True)
-    return pooled[first]

@@ -11,7 +11,7 @@ import math
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -272,15 +272,15 @@ def read_state(folder: Path, meta: Meta) -> SearchState:
     content = _read(folder, meta.elites)
     with _reading(folder / meta.elites["file"]):
         arrays = untrusted.read_arrays(content, _ARRAYS)
-        elites = Elites(*(arrays[name] for name in Elites.__dataclass_fields__))
-        pending = Offspring(*(arrays[f"pending_{name}"] for name in Offspring.__dataclass_fields__))
+        elites = Elites(*(arrays[field.name] for field in fields(Elites)))
+        pending = Offspring(*(arrays[f"pending_{field.name}"] for field in fields(Offspring)))
         _check_state(elites, pending, meta)
     return SearchState(elites, pending, meta.births, meta.step)
 
 
 def _check_state(elites: Elites, pending: Offspring, meta: Meta) -> None:
     for rows in (elites, pending):
-        if len({len(getattr(rows, name)) for name in rows.__dataclass_fields__}) != 1:
+        if len({len(column) for column in rows.columns().values()}) != 1:
             raise ValueError("its arrays differ in length")
     if elites.behavior.shape[1] != len(meta.config.bounds):
         raise ValueError(f"its behaviors have {elites.behavior.shape[1]} axes")

@@ -24,20 +24,25 @@ step : int32
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
+from nichechain.core.columns import Columnar
 from nichechain.core.errors import NichechainError
 from nichechain.domains.base import Evaluation
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 NONE = -1
 """Stands for a null uid or niche in the arrays of this package."""
 
 
 @dataclass(frozen=True)
-class Offspring:
+class Offspring(Columnar):
     """Genotypes on their way to be evaluated, and where they come from.
 
     Parameters
@@ -55,11 +60,11 @@ class Offspring:
     parent_niche: NDArray[np.int64]
     depth: NDArray[np.int64]
 
-    def __len__(self) -> int:
-        return len(self.uid)
-
-    def __getitem__(self, rows: slice) -> Offspring:
-        return Offspring(*(getattr(self, name)[rows] for name in self.__dataclass_fields__))
+    @classmethod
+    def none(cls, length: int) -> Offspring:
+        """No offspring, of genotypes of that length."""
+        none = np.empty(0, np.int64)
+        return cls(np.empty((0, length), np.float32), none, none, none, none)
 
 
 def schema(axes: int) -> pa.Schema:
@@ -81,7 +86,7 @@ def schema(axes: int) -> pa.Schema:
     )
 
 
-def check_columns(births: pa.Table, *names: str) -> None:
+def check_columns(births: pa.Table | pd.DataFrame, *names: str) -> None:
     """Refuse a table that lacks some of these columns.
 
     Raises
@@ -89,12 +94,13 @@ def check_columns(births: pa.Table, *names: str) -> None:
     NichechainError
         If it does.
     """
-    missing = [name for name in names if name not in births.column_names]
+    there = births.column_names if isinstance(births, pa.Table) else births.columns
+    missing = [name for name in names if name not in there]
     if missing:
         raise NichechainError(f"births have no column {missing[0]}, but need {', '.join(names)}")
 
 
-def table(
+def make_table(
     offspring: Offspring,
     evaluation: Evaluation,
     *,

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
+from nichechain.births.joins import across_runs
 from nichechain.births.table import NONE
 from nichechain.core.checks import as_floats, as_whole
 from nichechain.core.errors import NichechainError
@@ -117,9 +118,7 @@ class TransitionCounts:
         if "parent_uid" in names:
             elite = _states("parent_uid", births["parent_uid"])
             if "run" in names:
-                # One number for an elite of all runs.
-                span = 1 + elite.max(initial=0)
-                elite = np.where(elite == NONE, NONE, _states("run", births["run"]) * span + elite)
+                (elite,) = across_runs(_states("run", births["run"]), elite)
         return cls.from_births(births["parent_niche"], births["child_niche"], niches, elite=elite)
 
     @classmethod

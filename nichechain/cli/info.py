@@ -13,7 +13,7 @@ from nichechain.cli import console
 
 
 @dataclass(frozen=True)
-class Info:
+class InfoCommand:
     """What is in an archive, with the configuration and versions that made it."""
 
     path: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="PATH")]
@@ -24,10 +24,12 @@ class Info:
 
 def run(arguments: Sequence[str]) -> int:
     """Say what is in the archive."""
-    command = console.parse(Info, arguments)
+    command = console.parse(InfoCommand, arguments)
     from nichechain.archive.archive import load
+    from nichechain.search import savings
 
     archive = load(command.path)
+    saved = savings.read(archive.folder)
     meta, counts, config = archive.meta, archive.counts, archive.config
     size = sum(path.stat().st_size for path in archive.folder.rglob("*") if path.is_file())
     names, unit = meta.facts.behavior_names, meta.facts.unit
@@ -44,6 +46,8 @@ def run(arguments: Sequence[str]) -> int:
         "births_failed": meta.births - int(counts.visits.sum()),
         "deepest_elite": int(archive.elites.depth.max()) if len(archive.elites) else 0,
         "genotype_length": int(archive.elites.genotype.shape[1]),
+        "physics_steps": saved.steps,
+        "physics_steps_known": saved.known,
         "bytes": size,
     }
     if command.format == "json":
@@ -71,6 +75,7 @@ def run(arguments: Sequence[str]) -> int:
         "rows of T observed": str(content["rows_of_T_observed"]),
         "deepest elite": f"{content['deepest_elite']} generations",
         "genotype": f"{content['genotype_length']} parameters",
+        **console.physics(saved),
         "on disk": f"{size / 1e6:.1f} MB",
     }
     shown = console.console()

@@ -23,6 +23,7 @@ from nichechain.niches import Niches
 from nichechain.search.config import BuildConfig
 from nichechain.search.elites import EliteArchive, Elites, SearchState
 from nichechain.search.parents import CuriosityScores, draw_curious
+from nichechain.search.savings import Savings
 from nichechain.variation import Mutation
 
 
@@ -46,6 +47,8 @@ class MapElites:
         Births so far.
     step : int
         The last step begun, -1 before the first.
+    savings : Savings
+        How much physics the births so far were spared, as far as they were evaluated here.
     settled : bool
         Whether the state is that after a finished batch, not in the middle of keeping one.
 
@@ -72,9 +75,10 @@ class MapElites:
         self._config = config
         self._mutate = mutate
         self._archive = EliteArchive(domain, niches)
-        self._pending = _no_offspring(domain.genotype_length)
+        self._pending = Offspring.none(domain.genotype_length)
         self.births = 0
         self.step = -1
+        self.savings = Savings()
         self.settled = True
         if state is not None:
             self._archive.add(state.elites)
@@ -129,6 +133,7 @@ class MapElites:
         self._pending = waiting[limit:]
         self.step = step
         self.births += len(offspring)
+        self.savings = self.savings.and_of(evaluation)
         rows = self._keep(offspring, evaluation)
         self.settled = True
         return rows
@@ -188,7 +193,7 @@ class MapElites:
         accepted[fine] = self._archive.add(candidates[fine])
         if self._config.selection == "curiosity":
             self._curiosity.tell(offspring.parent_uid, accepted)
-        return births.table(offspring, evaluation, child_niche=niche, accepted=accepted, step=self.step)
+        return births.make_table(offspring, evaluation, child_niche=niche, accepted=accepted, step=self.step)
 
     def _keys(self, uid: NDArray[np.int64], objective: NDArray[np.float64]) -> NDArray[np.float64]:
         """The key of each birth; the largest of a niche makes its elite."""
@@ -204,8 +209,3 @@ class MapElites:
                 return uid.astype(np.float64)
             case "objective":
                 return objective
-
-
-def _no_offspring(length: int) -> Offspring:
-    none = np.empty(0, np.int64)
-    return Offspring(np.empty((0, length), np.float32), none, none, none, none)

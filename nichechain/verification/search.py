@@ -20,8 +20,8 @@ from nichechain.domains.base import Domain, Evaluation
 from nichechain.niches import Niches
 from nichechain.search.elites import Elites, SearchState
 from nichechain.search.map_elites import MapElites
+from nichechain.verification.record import Births, Bools, Run, differs, largest_difference
 from nichechain.verification.result import SEARCH, Check
-from nichechain.verification.runs import Births, Bools, Run, differs, largest_difference
 
 _GROUP = "search"
 

@@ -20,7 +20,7 @@ from nichechain.execution import Threads
 from nichechain.execution.base import WORKER_DIED
 from nichechain.niches import CVTNiches
 from nichechain.search.config import BuildConfig
-from nichechain.verification import Progress, Verification, verify
+from nichechain.verification import Verification, VerificationProgress, verify
 
 from .conftest import CONFIG, Forgery, RoughArm, built
 
@@ -103,7 +103,7 @@ def test_the_seed_decides_who_is_evaluated(genuine: Archive) -> None:
 
 
 def test_progress_ends_with_all_done(genuine: Archive) -> None:
-    last: dict[str, Progress] = {}
+    last: dict[str, VerificationProgress] = {}
     verify(genuine, sample=9, on_progress=lambda now: last.update({now.stage: now}))
     assert {stage: now.done for stage, now in last.items()} == {
         stage: now.total for stage, now in last.items()

@@ -111,7 +111,7 @@ class Inside:
 
     def visits(self) -> Floats | None:
         """Stationary measure where nothing leaves the set; None where elimination takes too long."""
-        return None if self._at_once is None else self._at_once.visits()
+        return None if self.at_once is None else self.at_once.visits()
 
     @cached_property
     def times(self) -> Floats:
@@ -132,7 +132,7 @@ class Inside:
         return None
 
     @cached_property
-    def _at_once(self) -> Dense | Banded | None:
+    def at_once(self) -> Dense | Banded | None:
         """Factors where they take little time."""
         if isinstance(self.onward, PooledTransition):
             return None
@@ -153,7 +153,7 @@ class Inside:
     def _solved(self, right: Floats, *, transposed: bool) -> Floats:
         if not right.any():
             return np.zeros(self.size)
-        factors = self._at_once
+        factors = self.at_once
         if factors is None:
             found = self._iterated(right, transposed=transposed)
             if found is not None:

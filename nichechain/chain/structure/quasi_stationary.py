@@ -142,6 +142,11 @@ def decay(rows: sparse.csr_array, states: Ints) -> tuple[float, Floats]:
     inside = _Slowed.of(rows, states)
     if not inside.system.leaving.any():
         return 0.0, stationary_of(rows, states)
+    if inside.system.at_once is None:
+        # So many states are eliminated once at most, and not for every shift.
+        found = _iterated(inside.system)
+        if found is not None:
+            return found
     for _ in range(_MOST_STEPS):
         low, high = inside.bounds
         if high - low <= _CONVERGED * high:
@@ -159,6 +164,19 @@ def decay(rows: sparse.csr_array, states: Ints) -> tuple[float, Floats]:
         share = near.solve_transposed(share)
         share /= share.sum()
     return low, share
+
+
+def _iterated(inside: Inside) -> tuple[float, Floats] | None:
+    """The same by inverse iteration without shifts; None where it converges too slowly."""
+    ahead, behind = np.ones(inside.size), np.ones(inside.size)
+    for _ in range(_MOST_STEPS):
+        solved, share = inside.solve(ahead), inside.solve_transposed(behind)
+        # Bounds of the smallest eigenvalue (Collatz 1942; Wielandt 1950), and of what is left in the vector.
+        rate, left = ahead / solved, behind / share
+        ahead, behind = solved / solved.max(), share / share.sum()
+        if np.ptp(rate) <= _NEARLY * rate.min() and np.ptp(left) <= _NEARLY * left.min():
+            return float(rate.min()), behind
+    return None
 
 
 @dataclass(frozen=True)

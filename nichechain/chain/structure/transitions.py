@@ -20,8 +20,6 @@ Rows: TypeAlias = "sparse.csr_array | PooledTransition"
 
 # Up to here a posterior mean, which has no zeros, is kept whole: 72 MB and as much again for indices.
 _WHOLE = 3_000
-# Rows of a larger one are made together up to so many numbers.
-_AT_ONCE = 4_000_000
 
 
 def rows_of(chain: NicheChain) -> Rows:
@@ -45,13 +43,24 @@ def entries_above(chain: NicheChain, threshold: float) -> sparse.csr_array:
         rows.data = np.where(rows.data > threshold, rows.data, 0.0)
         rows.eliminate_zeros()
         return rows
-    step = max(1, _AT_ONCE // chain.states)
-    blocks = []
-    for start in range(0, chain.states, step):
-        block = rows[np.arange(start, min(start + step, chain.states))].toarray()
-        block[block <= threshold] = 0.0
-        blocks.append(sparse.csr_array(block))
-    return sparse.vstack(blocks, format="csr")
+    if threshold <= 0.0:
+        return sparse.csr_array(chain.T)
+    # Of so many parts, one at least must be above its share of the threshold.
+    least = threshold / (rows.pools.shape[0] + 2)
+    pairs = [np.stack(rows.kept.nonzero()).astype(np.int64)]
+    for share, pool in zip(rows.shares.T, rows.pools, strict=True):
+        many = np.flatnonzero(pool * share.max() > least)
+        starts, column = np.nonzero(share[:, None] * pool[many] > least)
+        pairs.append(np.stack([starts, many[column]]))
+    for row in np.flatnonzero(rows.spread).tolist():
+        assert rows.displacement is not None
+        near = np.flatnonzero(rows.displacement.row(int(rows.cell[row])) > least / rows.spread[row])
+        pairs.append(np.stack([np.full(near.size, row), near]))
+    places = np.concatenate(pairs, axis=1)
+    parent, child = np.divmod(np.unique(places[0] * chain.states + places[1]), chain.states)
+    values = _at(rows, parent, child)
+    above = values > threshold
+    return sparse.csr_array((values[above], (parent[above], child[above])), shape=rows.shape)
 
 
 def staying(chain: NicheChain) -> Floats:
@@ -59,13 +68,8 @@ def staying(chain: NicheChain) -> Floats:
     rows = rows_of(chain)
     if isinstance(rows, sparse.csr_array):
         return np.asarray(rows.diagonal())
-    stay: Floats = rows.kept.diagonal() + np.einsum("ir,ri->i", rows.shares, rows.pools)
-    displaced = np.flatnonzero(rows.spread)
-    if displaced.size:
-        assert rows.displacement is not None
-        cell = rows.cell[displaced]
-        stay[displaced] += rows.spread[displaced] * rows.displacement.at(cell, cell)
-    return stay
+    states = np.arange(chain.states)
+    return _at(rows, states, states)
 
 
 def leaving_alone(rows: sparse.csr_array, state: int) -> float:
@@ -90,6 +94,18 @@ def graph_of(rows: Rows, chain: NicheChain) -> sparse.csr_array:
     kept = rows.kept.copy()
     kept.eliminate_zeros()
     return sparse.block_array([[kept, to_pool], [from_pool, None]], format="csr")
+
+
+def _at(rows: PooledTransition, parent: Ints, child: Ints) -> Floats:
+    """T_ij of some pairs of states, (N,)."""
+    values: Floats = np.asarray(rows.kept[parent, child]).ravel()
+    values = values + np.einsum("nr,rn->n", rows.shares[parent], rows.pools[:, child])
+    if rows.displacement is not None:
+        inside = child < len(rows.displacement.within)
+        displaced = np.flatnonzero((rows.spread[parent] > 0.0) & inside)
+        near = rows.displacement.at(rows.cell[parent[displaced]], child[displaced])
+        values[displaced] += rows.spread[parent[displaced]] * near
+    return values
 
 
 def reachable(graph: sparse.csr_array, start: Ints, states: int) -> Ints:

@@ -10,6 +10,7 @@ import pytest
 from scipy import sparse
 
 from nichechain import GridNiches, NicheChain, NichechainError, TransitionCounts, estimate
+from nichechain.chain.structure import transitions
 from nichechain.chain.structure.graph import betweenness, reachability_graph
 
 # Niches 0 1 2 3 in a row, centres at x = 1, 3, 5, 7, all at y = 0.5; the outside is state 4.
@@ -175,3 +176,19 @@ def test_betweenness_counts_states_that_the_graph_leaves_out():
     # Only the path 0 → 1 → 2 exists, among 5 · 4 ordered pairs of the other five states.
     assert found.shape == (6,)
     np.testing.assert_allclose(found, [0, 1 / 20, 0, 0, 0, 0])
+
+
+def test_transitions_above_a_threshold_where_t_is_kept_in_parts(monkeypatch):
+    niches = GridNiches((12, 12), ((0.0, 1.0), (0.0, 1.0)))
+    rng = np.random.default_rng(0)
+    place = rng.random((2000, 2))
+    child = niches.of(place + 0.1 * rng.standard_cauchy((2000, 2)))
+    chain = estimate(TransitionCounts.from_pairs(niches.of(place), child, niches))
+    whole = [transitions.entries_above(chain, t).toarray() for t in (0.003, 0.02, 0.2)]
+    stay = transitions.staying(chain)
+    monkeypatch.setattr(transitions, "_WHOLE", 10)
+    for threshold, expected in zip((0.003, 0.02, 0.2), whole, strict=True):
+        np.testing.assert_allclose(
+            transitions.entries_above(chain, threshold).toarray(), expected, rtol=1e-12
+        )
+    np.testing.assert_allclose(transitions.staying(chain), stay, rtol=1e-12)

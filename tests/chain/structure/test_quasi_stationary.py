@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from hypothesis import given, settings
+from scipy import sparse
 
 from nichechain import NicheChain
+from nichechain.chain.structure import inside
 from nichechain.chain.structure.quasi_stationary import quasi_stationary_distribution
 
 from .samples import MIXED, graded, ladder
@@ -109,3 +111,18 @@ def test_laws_of_staying(transition):
     np.fill_diagonal(inner, 0.0)
     out = inner.sum(axis=1) + transition[:-1, -1]
     np.testing.assert_allclose(share * out, share @ inner + found.leaving * share, rtol=1e-8)
+
+
+def test_many_states_are_left_at_the_rate_that_few_are(monkeypatch):
+    rng = np.random.default_rng(4)
+    weights = sparse.random_array((300, 300), density=0.05, rng=rng) + 0.01 * sparse.eye_array(300)
+    weights = sparse.csr_array(
+        weights + sparse.diags_array([np.full(299, 0.1)], offsets=[1], shape=(300, 300))
+    )
+    chain = NicheChain(weights, normalize=True)
+    by_elimination = quasi_stationary_distribution(chain, range(250))
+    monkeypatch.setattr(inside, "_SMALL", 10)
+    monkeypatch.setattr(inside, "_LITTLE_WORK", 10)
+    by_iteration = quasi_stationary_distribution(chain, range(250))
+    assert by_iteration.leaving == pytest.approx(by_elimination.leaving, rel=1e-8)
+    np.testing.assert_allclose(by_iteration.distribution, by_elimination.distribution, atol=1e-9)
