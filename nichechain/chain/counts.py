@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
+from nichechain.births.families import tabulated
 from nichechain.births.joins import across_runs
 from nichechain.births.table import NONE
 from nichechain.core.checks import as_floats, as_whole
@@ -105,8 +106,7 @@ class TransitionCounts:
             raise NichechainError(f"elites have shape {uid.shape} and parents {i.shape}, but must be alike")
         # Children whose parents are not known are not siblings for that.
         own = moved & (uid != NONE)
-        kinds, size = np.unique(np.stack([i[own], uid[own], j[own]]), axis=1, return_counts=True)
-        return replace(counts, families=np.vstack([kinds, size]).T)
+        return replace(counts, families=tabulated(i[own], uid[own], j[own]))
 
     @classmethod
     def _from_table(cls, births: Any, niches: Niches) -> TransitionCounts:
