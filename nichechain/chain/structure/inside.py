@@ -27,7 +27,8 @@ _BAND_CELLS = 100_000_000
 _BAND_WORK = 100_000_000_000
 # A band that is eliminated in less time than iterations are likely to take.
 _LITTLE_WORK = 1_000_000_000
-_TOLERANCE = 1e-9
+# What is proven of an iterated solution; it is usually better by far.
+_TOLERANCE = 1e-6
 _ROUNDS = 4
 _EPS = float(np.finfo(float).eps)
 
@@ -54,7 +55,7 @@ class Inside:
     restarted GMRES iterate on (I − Q) x = b, and a solution counts only if it is proven: (I − Q) has
     an inverse without negative entries, so |b − (I − Q) x| ≤ ε b proves that no entry is off by more
     than the share ε of it; where b has zeros, the largest residual times the longest mean time inside
-    bounds every error. Where that is not within 1e-9, states are eliminated after all as long as
+    bounds every error. Where that is not within 1e-6, states are eliminated after all as long as
     that fits in memory.
     """
 
@@ -189,14 +190,16 @@ class Inside:
                     break
                 if self._proven(found, np.abs(left), right, transposed=transposed):
                     return np.maximum(found, 0.0)
+                if self._rounding(found, right).max() > right.max():
+                    # So large a solution can never be proven.
+                    return None
         return None
 
     def _proven(self, found: Floats, residual: Floats, right: Floats, *, transposed: bool) -> bool:
-        # What rounding leaves in the residual itself.
-        doubt = residual + 8.0 * _EPS * (2.0 * self.rate * np.abs(found) + right)
+        doubt = residual + self._rounding(found, right)
         if (doubt <= _TOLERANCE * right).all():
             return True
-        if doubt.max() > 1e-6 * right.max():
+        if doubt.max() > _TOLERANCE * right.max():
             return False
         if not transposed and (right == right[0]).all():
             # These are the times themselves.
@@ -208,6 +211,11 @@ class Inside:
         error = float(doubt @ times if transposed else doubt.max() * times.max())
         scale = float(np.abs(found).sum() if transposed else np.abs(found).max())
         return error <= _TOLERANCE * scale
+
+    def _rounding(self, found: Floats, right: Floats) -> Floats:
+        """What rounding leaves in a residual, at most."""
+        rounding: Floats = 8.0 * _EPS * (2.0 * self.rate * np.abs(found) + right)
+        return rounding
 
     def _apply(self, values: Floats, *, transposed: bool) -> Floats:
         """(I − Q) x, or x (I − Q)."""

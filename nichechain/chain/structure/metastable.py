@@ -181,6 +181,7 @@ def _divided(rows: sparse.csr_array, states: Ints, parts: int) -> Floats:
         with _silence():
             from pygpcca import GPCCA
 
+            warnings.simplefilter("ignore")
             uniform = np.full(states.size, 1.0 / states.size)
             found = GPCCA(inner, eta=uniform, z="LR", method="brandts").optimize(parts)
     except ModuleNotFoundError as error:

@@ -17,7 +17,7 @@ Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
 # What rounding, or the proven error of an iteration, may add to a probability of 1.
-_ABOVE_ONE = 1e-8
+_ABOVE_ONE = 1e-6
 
 
 def hitting_probabilities(chain: NicheChain, target: Target) -> Floats:
@@ -80,7 +80,7 @@ def mean_first_passage_times(chain: NicheChain, target: Target) -> Floats:
     -----
     m = 1 + T m off the target (Norris 1997, theorem 1.3.5), of ``chain.T``; for the times that a
     posterior allows see :func:`nichechain.chain.structure.intervals.posterior_interval`. Each time
-    is within the share 1e-9 of itself, and nearly exact where states are eliminated, see
+    is within the share 1e-6 of itself, and nearly exact where states are eliminated, see
     :class:`nichechain.chain.structure.inside.Inside`.
     """
     wanted = states_of(chain, target)

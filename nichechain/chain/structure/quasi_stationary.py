@@ -114,7 +114,7 @@ def quasi_stationary_distribution(chain: NicheChain, states: Target | None = Non
         # Downstream lineages come in from the slowest part faster than they leave.
         downstream = _Slowed.of(rows, within[after])
         while downstream.taken < leaving:
-            downstream = downstream.next(leaving)
+            downstream = downstream.next(min(downstream.sums.min(), leaving - downstream.taken))
         share[after] = downstream.solve_transposed(share[part] @ inner[part][:, after])
     distribution = np.zeros(chain.states)
     distribution[within] = share / share.sum()
@@ -151,14 +151,14 @@ def decay(rows: sparse.csr_array, states: Ints) -> tuple[float, Floats]:
         low, high = inside.bounds
         if high - low <= _CONVERGED * high:
             break
-        inside = inside.next(low)
+        inside = inside.next(inside.sums.min())
     else:
         raise NichechainError(
             f"the quasi-stationary distribution of {states.size} states does not converge: "
             f"between {low:.9g} and {high:.9g} leave them in a generation"
         )
     # So close to the eigenvalue, a step leaves nothing of other eigenvectors.
-    near = inside.next(inside.taken + (low - inside.taken) * (1.0 - _NEARLY))
+    near = inside.next(inside.sums.min() * (1.0 - _NEARLY))
     share = np.ones(states.size)
     for _ in range(_POLISH):
         share = near.solve_transposed(share)
@@ -201,29 +201,26 @@ class _Slowed:
         return cls(Inside.of(rows, states), np.ones(states.size), 0.0)
 
     @cached_property
-    def _times(self) -> Floats:
-        return self.system.times
+    def sums(self) -> Floats:
+        """What rows sum to once X is scaled by the times to leave, (m,)."""
+        return 1.0 / self.system.times
 
     @property
     def bounds(self) -> tuple[float, float]:
         """Of the smallest eigenvalue of I − Q (Collatz 1942; Wielandt 1950)."""
-        sums = 1.0 / self._times
-        return self.taken + float(sums.min()), self.taken + float(sums.max())
+        return self.taken + float(self.sums.min()), self.taken + float(self.sums.max())
 
-    def next(self, most: float) -> _Slowed:
-        """With as much taken as is surely right, but no more than ``most``."""
+    def next(self, step: float) -> _Slowed:
+        """With so much more taken, which must not be more than the smallest of the sums."""
         assert isinstance(self.system.onward, sparse.csr_array)
-        scale = self._times / self._times.max()
-        sums = 1.0 / self._times
-        step = min(float(sums.min()), most - self.taken)
+        scale = self.sums.min() / self.sums
         entries = self.system.onward.tocoo()
         row, column = entries.coords
         onward = sparse.csr_array(
             (entries.data * (scale[column] / scale[row]), (row, column)), shape=entries.shape
         )
-        system = Inside(onward, np.maximum(sums - step, 0.0), self.system.states)
-        taken = most if step < float(sums.min()) else self.taken + step
-        return _Slowed(system, self.scale * scale, taken)
+        system = Inside(onward, self.sums - step, self.system.states)
+        return _Slowed(system, self.scale * scale, self.taken + float(step))
 
     def solve_transposed(self, right: Floats) -> Floats:
         """The x with x (I − Q − taken) = b."""

@@ -43,7 +43,7 @@ def stationary_distribution(chain: NicheChain) -> Floats:
     Notes
     -----
     π = π T (Norris 1997, section 1.7), by elimination of states: right in every entry, also in one
-    of 1e-200, up to 2,000 states and for narrow bands of any length; beyond that within 1e-9.
+    of 1e-200, up to 2,000 states and for narrow bands of any length; beyond that within 1e-6.
     """
     rows = rows_of(chain)
     classes = closed_classes_of(graph_of(rows, chain), chain.states)
