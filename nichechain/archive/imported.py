@@ -285,7 +285,8 @@ class _Reader:
         endless = known & np.isinf(behavior).any(axis=1)
         if endless.any():
             raise NichechainError(f"row {_row(endless)} has an infinite behavior, which belongs to no niche")
-        state[known] = self.niches.of(behavior[known])
+        narrow = all(pa.types.is_float32(self.table[name].type) for name in given)
+        state[known] = self.niches.of(behavior[known].astype(np.float32 if narrow else np.float64))
         return state, behavior
 
     def _numbers(self, name: str) -> Floats:

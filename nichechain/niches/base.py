@@ -87,7 +87,7 @@ class Niches(ABC):
         Parameters
         ----------
         behavior : (N, B) array
-            Finite values.
+            Finite values. Of float32, a value that is a bound in that precision lies on the bound.
 
         Returns
         -------
@@ -99,6 +99,7 @@ class Niches(ABC):
         NichechainError
             If the shape does not fit or a value is not finite.
         """
+        precision = precision_of(behavior)
         points = as_floats("behavior", behavior)
         if points.ndim != 2 or points.shape[1] != len(self.bounds):
             raise NichechainError(f"behavior has shape {points.shape}, but must be (N, {len(self.bounds)})")
@@ -106,7 +107,7 @@ class Niches(ABC):
             raise NichechainError("behavior has NaN or infinite values, which belong to no niche")
         state = self._nearest(points)
         if self.outside != "clip":
-            state[~is_inside(points, self.bounds)] = len(self)
+            state[~is_inside(points, self.bounds, precision)] = len(self)
         return state
 
     def label(self, state: int) -> str:
@@ -125,9 +126,27 @@ def check_bounds(bounds: Bounds) -> None:
             raise NichechainError(f"bounds are {low:g} to {high:g}, but must be finite and increasing")
 
 
-def is_inside(points: Floats, bounds: Bounds) -> NDArray[np.bool_]:
-    """Whether each point (N, B) lies in the box, ends included."""
-    lower, upper = np.array(bounds).T
+def precision_of(behavior: object) -> np.dtype[np.floating[Any]]:
+    """The precision that behaviors came in: that of an array of short floats, or else float64."""
+    kind = getattr(behavior, "dtype", None)
+    short = isinstance(kind, np.dtype) and kind.kind == "f" and kind.itemsize < 8
+    return np.dtype(kind if short else np.float64)
+
+
+def is_inside(
+    points: Floats, bounds: Bounds, precision: np.dtype[np.floating[Any]] | None = None
+) -> NDArray[np.bool_]:
+    """Whether each point (N, B) lies in the box, ends included.
+
+    Parameters
+    ----------
+    points : (N, B) float64 array
+    bounds : tuple of (float, float)
+    precision : numpy.dtype, optional
+        That of the values behind the points. The bounds are rounded to it: 1.1 in float32 is larger
+        than 1.1, and lies on a bound of 1.1 all the same.
+    """
+    lower, upper = np.array(bounds).astype(precision or np.float64).astype(np.float64).T
     inside: NDArray[np.bool_] = ((points >= lower) & (points <= upper)).all(axis=1)
     return inside
 
