@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Final, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,8 +15,14 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bounds = tuple[tuple[float, float], ...]
 
-Niche = int | tuple[int, ...]
-"""A niche is its flat id or its index: of a grid one number per axis (C order, axis 0 is x)."""
+OUTSIDE: Final = "outside"
+"""How the outside state is called."""
+
+Niche = int | tuple[int, ...] | Literal["outside"]
+"""A niche is its flat id or its index: of a grid one number per axis (C order, axis 0 is x).
+
+Where a state is asked for, the outside state is one as well: by its name, or its id n.
+"""
 
 OUTSIDE_MODES = ("state", "absorb", "clip")
 
@@ -110,9 +116,31 @@ class Niches(ABC):
             state[~is_inside(points, self.bounds, precision)] = len(self)
         return state
 
+    def state(self, niche: Niche) -> int:
+        """State of the chain, given as a niche or as the outside state.
+
+        Raises
+        ------
+        NichechainError
+            If there is no such state.
+        """
+        if isinstance(niche, str):
+            if niche != OUTSIDE:
+                raise NichechainError(
+                    f"niche is {niche!r}, but must be an index, a number, or {OUTSIDE!r}"
+                )
+            if self.outside == "clip":
+                raise NichechainError(
+                    "niche is 'outside', but these niches have no outside state: it is clipped"
+                )
+            return len(self)
+        if isinstance(niche, (int, np.integer)) and niche == len(self) and self.outside != "clip":
+            return len(self)
+        return self.flat(niche)
+
     def label(self, state: int) -> str:
         """How a state is called in tables and figures: its index, as ``"7,11"``, or ``"outside"``."""
-        return "outside" if state == len(self) else ",".join(map(str, self.index(state)))
+        return OUTSIDE if state == len(self) else ",".join(map(str, self.index(state)))
 
 
 MOST_NICHES = 10_000_000
