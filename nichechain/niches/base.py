@@ -126,9 +126,7 @@ class Niches(ABC):
         """
         if isinstance(niche, str):
             if niche != OUTSIDE:
-                raise NichechainError(
-                    f"niche is {niche!r}, but must be an index, a number, or {OUTSIDE!r}"
-                )
+                raise NichechainError(f"niche is {niche!r}, but must be an index, a number, or {OUTSIDE!r}")
             if self.outside == "clip":
                 raise NichechainError(
                     "niche is 'outside', but these niches have no outside state: it is clipped"
