@@ -227,7 +227,7 @@ class _Reader:
     def births(self, columns: Columns) -> pa.Table:
         """The rows as births."""
         size, dimensions = len(self.table), len(self.niches.bounds)
-        parent, _ = self._states(columns.parent)
+        parent, _ = self._states(columns.parent, whole=True)
         child, behavior = self._states(columns.child)
         run = self._runs(columns.run)
         uid = self._whole(columns.uid, lowest=0) if columns.uid else _within_runs(run)
@@ -268,8 +268,8 @@ class _Reader:
             raise NichechainError(f"a number is too large to be imported: {error}") from error
         return pa.Table.from_arrays(cast, schema=schema)
 
-    def _states(self, given: str | tuple[str, ...]) -> tuple[Ints, Floats | None]:
-        """States, and behavior where that is what is given."""
+    def _states(self, given: str | tuple[str, ...], *, whole: bool = False) -> tuple[Ints, Floats | None]:
+        """States, and behavior where that is what is given; ``whole`` ones have all of it or none."""
         if isinstance(given, str):
             state = self._whole(given, lowest=0, nulls=True)
             odd = state >= self.niches.states
@@ -285,8 +285,8 @@ class _Reader:
         behavior = np.stack([self._numbers(name) for name in given], axis=1)
         missing = np.isnan(behavior)
         half = missing.any(axis=1) & ~missing.all(axis=1)
-        # None at all is an initial birth, or one that failed.
-        if half.any():
+        # A parent without any is that of an initial birth; half a behavior is a mistake.
+        if whole and half.any():
             raise NichechainError(f"row {_row(half)} has only some of {', '.join(given)}: give all or none")
         known = ~missing.any(axis=1)
         state = np.full(len(behavior), NONE, np.int64)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy import fft, sparse
 from scipy.signal import fftconvolve
 
+from nichechain.core.arrays import entries_at
 from nichechain.core.row_sampler import RowSampler
 from nichechain.niches import GridNiches
 
@@ -159,7 +160,7 @@ class GridDisplacement:
         kept = np.asarray(counts.matrix[:n, :n].sum(axis=1), np.float64).ravel()
         # A row's own births inside are all among those that its kernel keeps in the grid.
         within = self.within[parent] * (kept.sum() + 0.5)
-        count = np.asarray(counts.matrix[parent, child]).ravel().astype(np.float64)
+        count = entries_at(counts.matrix, parent, child)
         return share * within - count, within - kept[parent]
 
     @cached_property

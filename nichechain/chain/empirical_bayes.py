@@ -19,6 +19,7 @@ from nichechain.births.families import elites_of
 from nichechain.chain.base_measure import BaseMeasure
 from nichechain.chain.counts import TransitionCounts
 from nichechain.chain.families import orphans_of
+from nichechain.core.arrays import entries_at
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -176,7 +177,7 @@ def _without_own(counts: TransitionCounts, parent: Ints, child: Ints) -> Floats:
     base = BaseMeasure.pooled(counts, _EVEN)
     destination, displaced, uniform = base.components(parent, child)
     n = len(counts.niches)
-    count = np.asarray(counts.matrix[parent, child]).ravel().astype(np.float64)
+    count = entries_at(counts.matrix, parent, child)
     births = counts.births.astype(np.float64)
     every = births.sum() + 1.0
     destination = (destination * every - count) / (every - births[parent])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import io
 import os
 import sys
 import warnings
@@ -20,9 +21,9 @@ def prepared() -> Iterator[None]:
     before = sys.stderr, warnings.showwarning
     for stream in (sys.stdout, sys.stderr):
         # A stream of ASCII shows question marks for what it lacks.
-        with contextlib.suppress(AttributeError, ValueError):
+        if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")
-    sys.stderr = _Forgiving(sys.stderr)  # type: ignore[assignment]
+    sys.stderr = _Forgiving(sys.stderr)
     warnings.showwarning = _say
     try:
         yield
