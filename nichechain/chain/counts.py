@@ -174,7 +174,7 @@ class TransitionCounts:
         if matrix.shape != (niches.states, niches.states):  # type: ignore[union-attr]
             raise NichechainError(
                 f"matrix has shape {matrix.shape}, "  # type: ignore[union-attr]
-                f"but these niches have {niches.states} states"
+                f"but must have ({niches.states}, {niches.states}), a row for each state"
             )
         entries = sparse.coo_array(matrix)
         parent, child = entries.coords

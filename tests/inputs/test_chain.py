@@ -30,9 +30,7 @@ from .table import (
     whole,
 )
 
-_BAD_NICHE = (-1, 6, (9, 9), (0,), "0,0", 1.5)
-# The outside state goes by its number, 6.
-_NOWHERE = (-1, 7, (9, 9), (0,), "0,0", 1.5)
+_BAD_NICHE = (-1, 7, (9, 9), (0,), "0,0", 1.5)
 _OTHER = GridNiches((3, 2), ((0.0, 3.0), (0.0, 1.0)))
 _THRESHOLD = (-0.1, 1.0, 1.5, *NOT_A_NUMBER)
 _SHARES = ([1.0], [0.5, 0.6, 0, 0, 0, 0], [-1.0, 2.0, 0, 0, 0, 0], [np.nan] * 6, *RAGGED)
@@ -141,28 +139,31 @@ CALLS = (
     Call(
         "chain.structure.passage.hitting_probabilities",
         lambda w: {"chain": w.estimated, "target": 0},
-        {"target": (*_NOWHERE, [], [0, 99], None)},
+        {"target": (*_BAD_NICHE, [], [0, 99], None)},
     ),
     Call(
         "chain.structure.passage.mean_first_passage_times",
         lambda w: {"chain": w.estimated, "target": 0},
-        {"target": (*_NOWHERE, [], [0, 99], None)},
+        {"target": (*_BAD_NICHE, [], [0, 99], None)},
     ),
     Call(
         "chain.structure.quasi_stationary.quasi_stationary_distribution",
         lambda w: {"chain": w.estimated, "states": [0, 1]},
-        {"states": (*_NOWHERE, [], [0, 99])},
+        {"states": (*_BAD_NICHE, [], [0, 99])},
     ),
     Call(
         "chain.structure.stationary.long_run_distribution",
         lambda w: {"chain": w.estimated, "root": 0},
-        {"root": (*_NOWHERE, [], [0, 99], None)},
+        {"root": (*_BAD_NICHE, [], [0, 99], None)},
     ),
     *(
         Call(
             f"chain.structure.committors.{name}",
             lambda w: {"chain": w.estimated, "source": 0, "target": [1, 2]},
-            {"source": (*_NOWHERE, [], [0, 99], None, 1), "target": (*_NOWHERE, [], [1, 99], None, [0, 1])},
+            {
+                "source": (*_BAD_NICHE, [], [0, 99], None, 1),
+                "target": (*_BAD_NICHE, [], [1, 99], None, [0, 1]),
+            },
         )
         for name in ("committor", "reactive_flux")
     ),

@@ -1,61 +1,24 @@
 """What a chain is made of: classes, passage times, wormholes, metastable sets, graphs."""
 
-from __future__ import annotations
-
-import importlib
-from typing import TYPE_CHECKING, Any
-
-if TYPE_CHECKING:
-    from nichechain.chain.structure.classes import (
-        absorbing_niches,
-        communicating_classes,
-        period,
-        recurrent_classes,
-    )
-    from nichechain.chain.structure.committors import ReactiveFlux, committor, reactive_flux
-    from nichechain.chain.structure.deeptime import to_deeptime
-    from nichechain.chain.structure.graph import betweenness, reachability_graph
-    from nichechain.chain.structure.intervals import PosteriorInterval, posterior_interval
-    from nichechain.chain.structure.metastable import MetastableSets, metastable_sets
-    from nichechain.chain.structure.passage import hitting_probabilities, mean_first_passage_times
-    from nichechain.chain.structure.quasi_stationary import QuasiStationary, quasi_stationary_distribution
-    from nichechain.chain.structure.stationary import (
-        entropy_rate,
-        long_run_distribution,
-        stationary_distribution,
-    )
-    from nichechain.chain.structure.timescales import implied_timescales, kemeny_constant
-    from nichechain.chain.structure.wormholes import wormhole_exposure
-
-# Names are imported when they are first used: some need NetworkX, pandas or compiled code.
-_HOMES = {
-    "MetastableSets": "metastable",
-    "PosteriorInterval": "intervals",
-    "QuasiStationary": "quasi_stationary",
-    "ReactiveFlux": "committors",
-    "absorbing_niches": "classes",
-    "betweenness": "graph",
-    "committor": "committors",
-    "communicating_classes": "classes",
-    "entropy_rate": "stationary",
-    "hitting_probabilities": "passage",
-    "implied_timescales": "timescales",
-    "kemeny_constant": "timescales",
-    "long_run_distribution": "stationary",
-    "mean_first_passage_times": "passage",
-    "metastable_sets": "metastable",
-    "period": "classes",
-    "posterior_interval": "intervals",
-    "quasi_stationary_distribution": "quasi_stationary",
-    "reachability_graph": "graph",
-    "reactive_flux": "committors",
-    "recurrent_classes": "classes",
-    "stationary_distribution": "stationary",
-    "to_deeptime": "deeptime",
-    "wormhole_exposure": "wormholes",
-}
+from nichechain.chain.structure.classes import (
+    absorbing_niches,
+    communicating_classes,
+    period,
+    recurrent_classes,
+)
+from nichechain.chain.structure.committors import ReactiveFlux, committor, reactive_flux
+from nichechain.chain.structure.deeptime import to_deeptime
+from nichechain.chain.structure.graph import LONG_JUMP, betweenness, reachability_graph
+from nichechain.chain.structure.intervals import PosteriorInterval, posterior_interval
+from nichechain.chain.structure.metastable import MetastableSets, metastable_sets
+from nichechain.chain.structure.passage import hitting_probabilities, mean_first_passage_times
+from nichechain.chain.structure.quasi_stationary import QuasiStationary, quasi_stationary_distribution
+from nichechain.chain.structure.stationary import entropy_rate, long_run_distribution, stationary_distribution
+from nichechain.chain.structure.timescales import implied_timescales, kemeny_constant
+from nichechain.chain.structure.wormholes import wormhole_exposure, wormholes
 
 __all__ = [
+    "LONG_JUMP",
     "MetastableSets",
     "PosteriorInterval",
     "QuasiStationary",
@@ -80,10 +43,5 @@ __all__ = [
     "stationary_distribution",
     "to_deeptime",
     "wormhole_exposure",
+    "wormholes",
 ]
-
-
-def __getattr__(name: str) -> Any:
-    if name in _HOMES:
-        return getattr(importlib.import_module(f"{__name__}.{_HOMES[name]}"), name)
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -36,17 +36,4 @@ def states_of(chain: NicheChain, target: Target, name: str = "target") -> Ints:
         several = [target]
     if not several:
         raise NichechainError(f"the {name} is empty, but must have at least one niche")
-    return np.unique([state_of(chain, niche) for niche in several])
-
-
-def state_of(chain: NicheChain, niche: Niche) -> int:
-    """A niche's state, or the outside state by its number.
-
-    Raises
-    ------
-    NichechainError
-        If there is no such niche.
-    """
-    if chain.outside is not None and isinstance(niche, (int, np.integer)) and niche == chain.outside:
-        return chain.outside
-    return chain.state(niche)
+    return np.unique([chain.state(niche) for niche in several])
