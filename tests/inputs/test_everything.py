@@ -187,11 +187,6 @@ EXEMPT: dict[tuple[str, str], str] = {
         ),
         ("search.config.BuildConfig", "domain outside mutation", _LATER),
         ("core.randomness.keyed", "seed purpose index", "called for every birth; NumPy refuses no seeds"),
-        (
-            "chain.structure.metastable.metastable_sets",
-            "groups",
-            "tests/chain/structure/test_metastable.py, where there is pygpcca",
-        ),
         ("studies.conditions.condition_seed", "label", _TEXT),
         ("niches.parsing.parse_bounds", "name", _TEXT),
         ("niches.parsing.parse_niche", "name", _TEXT),
