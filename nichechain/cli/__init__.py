@@ -8,6 +8,8 @@ import os
 import sys
 from collections.abc import Sequence
 
+__all__ = ["COMMANDS", "main"]
+
 COMMANDS = {
     "domains": "what can be searched, with bounds and genotype lengths",
     "build": "fill an archive: MAP-Elites that records who was born where",
@@ -41,7 +43,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     int
         Exit status: 0, 2 for bad input, 130 if interrupted.
     """
-    given = list(sys.argv[1:] if arguments is None else arguments)
+    from nichechain.cli import streams
+
+    with streams.prepared():
+        return _run(list(sys.argv[1:] if arguments is None else arguments))
+
+
+def _run(given: Sequence[str]) -> int:
     debug = "--debug" in given
     words = [word for word in given if word != "--debug"]
     if not words or words[0] in ("-h", "--help", "help"):

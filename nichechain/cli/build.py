@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shlex
 import sys
 from collections.abc import Sequence
 from dataclasses import KW_ONLY, dataclass
@@ -164,7 +165,7 @@ def run(arguments: Sequence[str]) -> int:
     command = parsing.parse(BuildCommand, arguments)
     from nichechain import execution
     from nichechain.archive import read, write
-    from nichechain.archive.build import build
+    from nichechain.archive.building import build
     from nichechain.archive.trust import check_trusted
     from nichechain.core.files import writing
     from nichechain.search.making import make_domain
@@ -214,7 +215,7 @@ def run(arguments: Sequence[str]) -> int:
         except KeyboardInterrupt:
             progress.leave_at_next_interrupt()
             kept = read.read_meta(folder).births if read.is_archive(folder) else 0
-            again = f"nichechain build {config.domain} --out {folder} --resume"
+            again = f"nichechain build {config.domain} --out {shlex.quote(str(folder))} --resume"
             shown.print(f"Stopped; {kept} of {config.evaluations} births are kept. To go on:\n  {again}")
             return 130
     _report(folder, shown)
@@ -268,9 +269,10 @@ def _report(folder: Path, shown: object) -> None:
         shown.print("\nNo niche has 20 births behind its row yet: too few to rank.")
     shown.print("Next:")
     best = f" --niche {ranking['index'].iloc[0]}" if len(ranking) else ""
+    path = shlex.quote(str(folder))
     for line in (
-        f"nichechain evolvability {folder}{best}",
-        f"nichechain plot {folder} reachability --out reachability.png",
-        f"nichechain info {folder}",
+        f"nichechain evolvability {path}{best}",
+        f"nichechain plot {path} reachability --out reachability.png",
+        f"nichechain info {path}",
     ):
         shown.print(f"  {line}")

@@ -121,7 +121,7 @@ def _one(command: EvolvabilityCommand, archive: Archive, chain: NicheChain) -> p
 
     if command.niche is not None:
         niche = parse_niche(command.niche, "--niche")
-        state = archive.niches.flat(niche)
+        state = archive.niches.state(niche)
         result = l_evolvability(
             chain,
             niche=niche,

@@ -189,11 +189,11 @@ SMALL_DISK = """
 import shutil, subprocess, sys
 from pathlib import Path
 from nichechain.archive import read, write
-from nichechain.archive.build import build
+from nichechain.archive.building import build
 from nichechain.search.config import BuildConfig
 from nichechain.core.errors import ArchiveError
 from nichechain.execution import Threads
-from nichechain.archive import build as building
+from nichechain.archive import building
 from nichechain.archive.archive import load
 
 write.PART_ROWS = 1000

@@ -11,10 +11,9 @@ from pathlib import Path
 
 import pytest
 
-from nichechain.archive import build as building
-from nichechain.archive import read, write
+from nichechain.archive import building, read, write
 from nichechain.archive.archive import load
-from nichechain.archive.build import build
+from nichechain.archive.building import build
 from nichechain.core.errors import ArchiveError
 from nichechain.core.files import writing
 from nichechain.execution import Threads
@@ -92,7 +91,7 @@ READER = """
 import sys
 from pathlib import Path
 import numpy as np
-from nichechain.archive import build as building, read, write
+from nichechain.archive import building, read, write
 from nichechain.archive.archive import load
 
 folder, total = Path(sys.argv[1]), int(sys.argv[2])
