@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+import warnings
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -10,13 +11,16 @@ from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
+from numpy.typing import NDArray
 
 from nichechain.archive import read, write
+from nichechain.births.table import NONE
 from nichechain.core.errors import ArchiveError
 from nichechain.core.files import writing
 from nichechain.domains.base import Domain
 from nichechain.execution import Executor
 from nichechain.search import savings
+from nichechain.search.bounds import FirstLook
 from nichechain.search.config import MOST_FAILED, BuildConfig
 from nichechain.search.failures import Failures, check_first_batch
 from nichechain.search.making import make_domain, make_mutation, make_niches
@@ -113,6 +117,7 @@ def build(
         search.savings = savings.read(folder) if state is not None else search.savings
         writer = write.Writer(folder, config, read.DomainFacts.of(domain), niches=niches)
 
+        first_look = FirstLook(len(niches), search.births)
         under_way = 0
 
         def tell(done: int = 0) -> None:
@@ -143,6 +148,9 @@ def build(
                 writer.append(rows)
                 outside += _count(rows, len(niches))
                 failures.count(rows)
+                note = first_look.tell(*_landed(rows), last=search.births >= config.evaluations)
+                if note is not None:
+                    warnings.warn(note, stacklevel=2)
                 tell()
                 if time.monotonic() - last_commit > pause:
                     began = time.monotonic()
@@ -155,6 +163,13 @@ def build(
             # is at most half a minute old.
             if search.settled and search.births == writer.births > 0:
                 commit()
+
+
+def _landed(rows: pa.Table) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Behavior and state of some births; NaN, and -1, where they failed."""
+    axes = [name for name in rows.column_names if name.startswith("behavior_")]
+    behavior = np.stack([rows[name].fill_null(np.nan).to_numpy() for name in axes], axis=1)
+    return behavior, rows["child_niche"].fill_null(NONE).to_numpy()
 
 
 def _count(rows: pa.Table, state: int) -> int:

@@ -216,10 +216,13 @@ def _stability(command: EstimateCommand, archive: Archive) -> None:
 
 
 def _course(command: EstimateCommand, archive: Archive) -> LevelCourse | None:
-    """Level against steps and births; None where births do not say their step, or are too few."""
+    """Level against steps and births; None where births say no step or are too few, or niches too many."""
     from nichechain.archive.read import read_births
+    from nichechain.evolvability.question import MOST_EXACT
     from nichechain.validation.drift import level_course
 
+    if archive.niches.states > MOST_EXACT:
+        return None
     births = read_births(archive.folder, archive.meta)
     try:
         return level_course(births, archive.niches, seed=command.seed)

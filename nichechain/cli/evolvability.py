@@ -37,8 +37,9 @@ class EvolvabilityCommand:
     """What to rank: niches, or elites by the children recorded of each."""
     top: Annotated[int | None, parsing.option("INT", "10")] = None
     """So many of the best."""
-    method: Literal["exact", "monte-carlo"] = "exact"
-    """In closed form, or by the paper's simulation."""
+    method: Literal["auto", "exact", "monte-carlo"] = "auto"
+    """In closed form, or by the paper's simulation; auto is in closed form up to 1,000 states, and beyond
+    simulates lineages on rows of T that are drawn where they are entered."""
     convention: Literal["definition", "procedure"] = "definition"
     """Whether the descendants alone count, or the root's own niche as well."""
     estimator: parsing.EstimatorName = "empirical-bayes"
@@ -114,9 +115,9 @@ def _check(command: EvolvabilityCommand) -> None:
             raise NichechainError(f"{wanted} is of niches, but --rank asks for elites: ask for niches")
         if command.estimator != "empirical-bayes":
             raise NichechainError(f"{wanted} belongs to empirical-bayes, not to {command.estimator}")
-        if command.method != "exact":
-            raise NichechainError(f"{wanted} is computed in closed form, not by {command.method}")
-    if command.rank == "elites" and command.method != "exact":
+        if command.method == "monte-carlo":
+            raise NichechainError(f"{wanted} is not computed by {command.method}")
+    if command.rank == "elites" and command.method == "monte-carlo":
         raise NichechainError(f"elites are ranked in closed form, not by {command.method}")
     for name in ("top", "draws", "repeats"):
         if getattr(command, name) is not None:
@@ -145,7 +146,7 @@ def _one(command: EvolvabilityCommand, archive: Archive, chain: NicheChain) -> p
 
     if command.niche is not None:
         niche = parse_niche(command.niche, "--niche")
-        state = archive.niches.flat(niche)
+        state = archive.niches.state(niche)
         result = l_evolvability(
             chain,
             niche=niche,
@@ -179,30 +180,42 @@ def _best_elites(command: EvolvabilityCommand, archive: Archive, chain: NicheCha
 
     asked = {name: value for name, value in command.asked().items() if name not in ("method", "repeats")}
     ranking = elite_evolvability(archive, chain=chain, **asked)
-    frame = _enough(ranking[ranking["births"] >= command.min_births], command)
+    ranking = ranking[ranking["births"] >= command.min_births]
+    _check_enough(len(ranking), command)
+    frame = ranking.head(command.top or 10).copy()
     frame.insert(2, "root", "elite")
-    for name in ("l", "lineages", "method", "convention"):
+    for name in ("l", "lineages", "convention"):
         frame[name] = getattr(command, name)
-    frame["estimator"] = chain.estimator
+    frame["method"], frame["estimator"] = "exact", chain.estimator
     return frame
 
 
-def _enough(ranking: pd.DataFrame, command: EvolvabilityCommand) -> pd.DataFrame:
-    """The first rows of a ranking that has some."""
-    if ranking.empty:
+def _check_enough(ranked: int, command: EvolvabilityCommand) -> None:
+    """Refuse an empty ranking."""
+    if not ranked:
         raise NichechainError(
             f"no niche has {command.min_births} births behind its row of T: "
             "lower --min-births or build further"
         )
-    return ranking.head(command.top or 10).copy()
 
 
 def _best(command: EvolvabilityCommand, chain: NicheChain) -> pd.DataFrame:
     """The best niches, best first."""
-    from nichechain.evolvability import niche_evolvability
+    import numpy as np
 
-    scores = niche_evolvability(chain, **command.asked())
-    frame = _enough(scores.ranking(chain, min_births=command.min_births), command)
+    from nichechain.evolvability.niches import answer_for_niches
+    from nichechain.evolvability.question import Question
+
+    question = Question(**command.asked())
+    # Only niches that are ranked have to be scored.
+    births = np.zeros(chain.n_niches) if chain.births is None else chain.births[: chain.n_niches]
+    ranked = np.flatnonzero(births >= command.min_births)
+    _check_enough(ranked.size, command)
+    draws = 1 if chain.posterior is None else command.draws
+    with progress.counting(draws, "draws of T") as tell:
+        scores = answer_for_niches(chain, question, roots=ranked, tell=tell)
+    ranking = scores.ranking(chain, min_births=command.min_births)
+    frame = ranking.head(command.top or 10).copy()
     frame.insert(2, "root", "niche")
     for name in ("l", "lineages", "method", "convention", "estimator", "saturated"):
         frame[name] = getattr(scores, name)
@@ -211,11 +224,13 @@ def _best(command: EvolvabilityCommand, chain: NicheChain) -> pd.DataFrame:
 
 def _drift(command: EvolvabilityCommand, archive: Archive) -> str:
     """What to say where early and late births disagree on the level, else nothing."""
-    if command.format != "table":
-        return ""
     from nichechain.archive.read import read_births
+    from nichechain.evolvability.question import MOST_EXACT
     from nichechain.validation.drift import level_drift
 
+    # Beyond, a level in closed form would take longer than what was asked for.
+    if command.format != "table" or archive.niches.states > MOST_EXACT:
+        return ""
     births = read_births(archive.folder, archive.meta)
     try:
         found = level_drift(births, archive.niches, l=command.l, lineages=command.lineages, seed=command.seed)
