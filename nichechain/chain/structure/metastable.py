@@ -190,7 +190,7 @@ def _divided(rows: sparse.csr_array, states: Ints, parts: int) -> Floats:
         raise NichechainError(
             'pyGPCCA is not installed, but metastable_sets needs it: pip install "nichechain[gpcca]"'
         ) from None
-    except ValueError as error:
+    except (ValueError, RuntimeError) as error:
         raise NichechainError(
             f"a class of {states.size} states does not divide into {parts} groups: "
             f"{' '.join(str(error).split())}"
