@@ -241,9 +241,9 @@ def _show_course(course: LevelCourse) -> None:
         table.add_row(
             f"{row.first_step} to {row.last_step}",
             str(row.births),
-            f"{row.level:.1f} ({row.low:.1f} to {row.high:.1f})",
+            f"{row.level:.1f} ± {row.level - row.low:.1f}",
             str(row.grown),
-            f"{row.grown_level:.1f} ({row.grown_low:.1f} to {row.grown_high:.1f})",
+            f"{row.grown_level:.1f} ± {row.grown_level - row.grown_low:.1f}",
         )
     shown.print(table)
 

@@ -74,8 +74,8 @@ class LevelDrift:
         levels = f"{self.early:.1f} by the first half of the births, {self.late:.1f} by the second"
         if self.disagrees:
             return (
-                f"The level drifts: over {self.niches} niches, mean {self.l}-evolvability is {levels}, "
-                "so take the numbers as a ranking."
+                f"Early and late births disagree on the level: over {self.niches} niches, "
+                f"mean {self.l}-evolvability is {levels}."
             )
         return f"Early and late births agree on the level: mean {self.l}-evolvability is {levels}."
 
