@@ -145,6 +145,7 @@ def read_table(content: bytes, schema: pa.Schema, rows: int, columns: list[str] 
         # A string may be stored once and named in every row, so rows are only spelled out when
         # the longest is known.
         read_dictionary=texts,
+        pre_buffer=False,
         thrift_string_size_limit=_THRIFT,
         thrift_container_size_limit=_THRIFT,
     )
@@ -159,7 +160,8 @@ def read_table(content: bytes, schema: pa.Schema, rows: int, columns: list[str] 
         size = sum(decoded_size(content, group.column(index)) for group in groups)
         if size > _SLACK + (LONGEST_STRING if name in texts else _NUMBER) * rows:
             raise ValueError(f"its column {name} claims to be larger than it can be")
-    table = file.read(columns)
+    # See nichechain.core.parquet on threads.
+    table = file.read(columns, use_threads=False)
     if len(table) != rows:
         raise ValueError(f"it has {len(table)} rows, but {rows} were written")
     for name in texts:
