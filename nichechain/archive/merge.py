@@ -76,7 +76,8 @@ def merge(folders: Sequence[str | Path], out: str | Path) -> None:
     # Checked before anything is read at length.
     if read.is_archive(out):
         raise ArchiveError(f"{out} already holds an archive: merge into another folder")
-    tables, elites = [], []
+    tables: list[pa.Table] = []
+    elites: list[Elites] = []
     first_run = first_uid = 0
     for path, meta in zip(paths, metas, strict=True):
         births = read.read_births(path, meta)
