@@ -26,7 +26,7 @@ from nichechain.archive.parquet_pages import decoded_size
 from nichechain.core.text import printable
 
 LONGEST_STRING = 1000
-"""Bytes of the longest string in a table that is believed."""
+"""Bytes of the longest string in a table, or characters in metadata, that is believed."""
 
 _SLACK = 1 << 20
 _NUMBER = 64
@@ -77,7 +77,23 @@ def read_object(content: bytes) -> dict[str, Any]:
     values = json.loads(content.decode("utf-8"))
     if not isinstance(values, dict):
         raise ValueError("it holds no object")
+    longest = _longest(values)
+    if longest > LONGEST_STRING:
+        raise ValueError(f"it has a text of {longest} characters, more than {LONGEST_STRING}")
     return values
+
+
+def _longest(values: Any) -> int:
+    """Characters of the longest text in a JSON value, keys included."""
+    match values:
+        case str():
+            return len(values)
+        case list():
+            return max(map(_longest, values), default=0)
+        case dict():
+            return max((max(len(name), _longest(value)) for name, value in values.items()), default=0)
+        case _:
+            return 0
 
 
 def read_arrays(content: bytes, kinds: Mapping[str, tuple[DTypeLike, int]]) -> dict[str, NDArray[Any]]:
