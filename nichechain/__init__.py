@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from nichechain import domains, landscape, studies, variation, walks
     from nichechain.archive.archive import Archive, Elite, load
     from nichechain.archive.build import build
+    from nichechain.archive.calibrate import calibrate
     from nichechain.chain import NicheChain, TransitionCounts, estimate
     from nichechain.core.errors import ArchiveError, NichechainError
     from nichechain.evolvability import (
@@ -54,6 +55,7 @@ _HOMES = {
     "Verification": "verification",
     "bootstrap_elites": "evolvability",
     "build": "archive.build",
+    "calibrate": "archive.calibrate",
     "curiosity": "search.parents",
     "estimate": "chain",
     "from_ribs": "pyribs",
@@ -87,6 +89,7 @@ __all__ = [
     "Verification",
     "bootstrap_elites",
     "build",
+    "calibrate",
     "curiosity",
     "domains",
     "estimate",

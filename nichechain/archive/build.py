@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pyarrow as pa
 
 from nichechain.archive import read, write
+from nichechain.archive.filling import Filling, Progress, count
 from nichechain.core.errors import ArchiveError
 from nichechain.core.locking import writing
 from nichechain.domains.base import Domain
@@ -20,29 +19,6 @@ from nichechain.search.failures import Failures, check_first_batch
 from nichechain.search.making import make_domain, make_mutation, make_niches
 from nichechain.search.map_elites import MapElites
 from nichechain.search.parents import CuriosityScores
-
-CHECKPOINT_SECONDS = 30.0
-_COMMIT_SHARE = 0.01
-
-
-@dataclass(frozen=True)
-class Progress:
-    """How far a build is.
-
-    Parameters
-    ----------
-    births : int
-        Evaluated so far, those of the batch under way among them.
-    filled : int
-        Niches with an elite.
-    outside, failed : int
-        Births out of bounds, and births whose evaluation failed.
-    """
-
-    births: int
-    filled: int
-    outside: int
-    failed: int
 
 
 def build(
@@ -95,6 +71,11 @@ def build(
             meta = read.read_meta(folder)
             if meta.origin is not None:
                 raise ArchiveError(f"{folder} was {meta.origin['kind']}, so no build can go on with it")
+            if meta.calibrations:
+                raise ArchiveError(
+                    f"{folder} has {meta.births - meta.built} births of a calibration, so no build can go on "
+                    "with it: build as far as you want, then calibrate"
+                )
             _check_continues(meta.config, config, meta.births, folder)
             niches = read.read_niches(folder, meta)
             state = read.read_state(folder, meta)
@@ -102,7 +83,7 @@ def build(
             rows = read.read_births(folder, meta, None if curious else ["child_niche", "failed"])
             if curious:
                 scores = CuriosityScores.of_births(rows)
-            outside = _count(rows, len(niches))
+            outside = count(rows, len(niches))
             failures.count(rows)
             del rows
         else:
@@ -110,46 +91,12 @@ def build(
         search = MapElites(domain, niches, mutate, config, state, scores)
         writer = write.Writer(folder, config, read.DomainFacts.of(domain), niches=niches)
 
-        under_way = 0
+        def check_first(rows: pa.Table) -> None:
+            if search.step == 0 and len(rows) == search.births:
+                check_first_batch(rows, domain, config.seed)
 
-        def tell(done: int = 0) -> None:
-            nonlocal under_way
-            under_way += done
-            if on_progress is not None:
-                on_progress(Progress(search.births + under_way, search.filled, outside, failures.failed))
-
-        last_commit = time.monotonic()
-        pause = CHECKPOINT_SECONDS
-        tell()
-        try:
-            while search.births < config.evaluations:
-                failures.check(
-                    f"{folder} keeps them, and --resume with a larger --max-failed goes on from there"
-                )
-                first = search.births == 0
-                rows = search.advance(executor, config.evaluations - search.births, tell)
-                under_way = 0
-                if first:
-                    check_first_batch(rows, domain, config.seed)
-                writer.append(rows)
-                outside += _count(rows, len(niches))
-                failures.count(rows)
-                tell()
-                if time.monotonic() - last_commit > pause:
-                    began = time.monotonic()
-                    writer.commit(search.state)
-                    last_commit = time.monotonic()
-                    # Many large genotypes take a while to write.
-                    pause = max(CHECKPOINT_SECONDS, (last_commit - began) / _COMMIT_SHARE)
-        finally:
-            # An interrupt between two halves of a step leaves nothing to commit; the last commit
-            # is at most half a minute old.
-            if search.settled and search.births == writer.births > 0:
-                writer.commit(search.state)
-
-
-def _count(rows: pa.Table, state: int) -> int:
-    return int(np.count_nonzero(rows["child_niche"].to_numpy() == state))
+        filling = Filling(folder, search, writer, failures, outside, len(niches), on_progress)
+        filling.go(config.evaluations, executor, check_first)
 
 
 def _check_continues(old: BuildConfig, new: BuildConfig, births: int, folder: Path) -> None:

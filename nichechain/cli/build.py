@@ -65,6 +65,11 @@ class Build:
     """Step sizes are genes, one per layer scale or else one: they begin at the scale and evolve."""
     selection: Selection = BuildConfig.selection
     """How parents are drawn from the elites: each alike, or by curiosity, whose children enter."""
+    lineage_share: float = BuildConfig.lineage_share
+    """Share of the births that unselected lineages get, whose parents are their own latest births: they
+    show what lineages do. 0 selects all parents."""
+    lineage_length: int = BuildConfig.lineage_length
+    """Births of such a lineage."""
     replacement: Replacement = BuildConfig.replacement
     """Which birth of a niche is its elite: each alike, the first, the last, or the best."""
     outside: Outside = BuildConfig.outside
@@ -154,6 +159,8 @@ class Build:
             else parse_layer_scales(self.layer_scales, "--layer-scales"),
             self_adaptive=self.self_adaptive,
             selection=self.selection,
+            lineage_share=self.lineage_share,
+            lineage_length=self.lineage_length,
             replacement=self.replacement,
             seed=self.seed,
         )
@@ -189,6 +196,8 @@ class Build:
             layer_scales=",".join(map(repr, config.layer_scales)) or None,
             self_adaptive=config.self_adaptive,
             selection=config.selection,
+            lineage_share=config.lineage_share,
+            lineage_length=config.lineage_length,
             replacement=config.replacement,
             outside=config.outside,
             seed=config.seed,

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
-    from nichechain.archive.build import Progress
+    from nichechain.archive.filling import Progress
 
 Command = TypeVar("Command")
 

@@ -70,6 +70,11 @@ class BuildConfig:
     selection : {"uniform", "curiosity"}
         How parents are drawn from the elites: each alike, or in proportion to the curiosity score,
         see :mod:`nichechain.search.parents`.
+    lineage_share : float
+        Share of the births that unselected lineages get, from 0 to below 1, see
+        :mod:`nichechain.search.lineages`. With 0 all parents are selected, which is the letter of the paper.
+    lineage_length : int
+        Births of such a lineage, at least 2.
 
     Raises
     ------
@@ -97,9 +102,12 @@ class BuildConfig:
     layer_scales: tuple[float, ...] = ()
     self_adaptive: bool = False
     selection: Selection = "uniform"
+    lineage_share: float = 0.05
+    lineage_length: int = 10
 
     def __post_init__(self) -> None:
-        for name in ("evaluations", "initial", "batch", "seed", "domain_seed", "niches_seed"):
+        whole = ("evaluations", "initial", "batch", "seed", "domain_seed", "niches_seed", "lineage_length")
+        for name in whole:
             try:
                 # Numbers of NumPy become plain ones, which JSON can hold.
                 object.__setattr__(self, name, operator.index(getattr(self, name)))
@@ -132,6 +140,17 @@ class BuildConfig:
         for name in ("seed", "domain_seed", "niches_seed"):
             if getattr(self, name) < 0:
                 raise NichechainError(f"{name} is {getattr(self, name)}, but must not be negative")
+        check_numbers(lineage_share=self.lineage_share)
+        object.__setattr__(self, "lineage_share", float(self.lineage_share))
+        if not 0 <= self.lineage_share < 1:
+            raise NichechainError(
+                f"lineage_share is {self.lineage_share:g}, but must be a share of births, from 0 to below 1"
+            )
+        if self.lineage_length < 2:
+            raise NichechainError(
+                f"lineage_length is {self.lineage_length}, but must be at least 2: the first birth "
+                "of a lineage is the child of an elite"
+            )
         if self.replacement not in get_args(Replacement):
             raise NichechainError(
                 f"replacement is {self.replacement!r}, but must be one of {', '.join(get_args(Replacement))}"
@@ -169,4 +188,5 @@ class BuildConfig:
             raise NichechainError(
                 f"the configuration has missing or unknown values: {', '.join(sorted(odd))}"
             )
-        return cls(**values)
+        # Before there were lineages, builds had none.
+        return cls(**{"lineage_share": 0.0, **values})

@@ -16,6 +16,7 @@ from nichechain.births.table import Offspring
 from nichechain.core.errors import NichechainError
 from nichechain.domains.base import Domain
 from nichechain.niches import CVTNiches, GridNiches, Niches
+from nichechain.search.lineages import Lineages
 
 
 @dataclass(frozen=True)
@@ -68,12 +69,21 @@ class SearchState:
         Births so far.
     step : int
         The last step begun, 0 for the initial births; -1 before them.
+    lineages : Lineages
+        Those under way.
     """
 
     elites: Elites
     pending: Offspring
     births: int
     step: int
+    lineages: Lineages
+
+    @classmethod
+    def at_rest(cls, elites: Elites, births: int, step: int) -> SearchState:
+        """A state of a search that has nothing under way."""
+        length = elites.genotype.shape[1]
+        return cls(elites, Offspring.none(length), births, step, Lineages.none(length))
 
 
 class EliteArchive:

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from nichechain.births.table import NONE, Offspring
 from nichechain.niches import Niches
 from nichechain.search.elites import Elites
+from nichechain.search.lineages import Lineages
 from nichechain.verification.result import Check
 from nichechain.verification.runs import Births, Ints, Run, differs
 
@@ -20,7 +21,8 @@ _EARLIER = "parents are earlier births of the same run"
 _BORN = "elites are births that did not fail"
 _FOLLOW = "pending children follow the births"
 _PARENTS = "pending children have parents, niche and depth"
-ROOTED = (_INITIAL, _EARLIER, _BORN, _FOLLOW, _PARENTS)
+_UNDER_WAY = "lineages under way are births that did not fail"
+ROOTED = (_INITIAL, _EARLIER, _BORN, _FOLLOW, _PARENTS, _UNDER_WAY)
 """Without these a genotype cannot be traced to its root."""
 
 
@@ -175,4 +177,23 @@ def check_pending(pending: Offspring, births: Births, first: int) -> list[Check]
     return [
         Check.of(_FOLLOW, _GROUP, pending.uid != uid, uid),
         Check.of(_PARENTS, _GROUP, ~earlier | lost, uid),
+    ]
+
+
+def check_lineages(lineages: Lineages, births: Births) -> list[Check]:
+    """Checks of lineages under way against the births that they stand at.
+
+    Parameters
+    ----------
+    lineages : Lineages
+    births : Births
+    """
+    at = np.clip(lineages.uid, 0, max(0, len(births) - 1))
+    there = (lineages.uid == at) & ~births.failed[at]
+    odd = (lineages.niche != births.child_niche[at]) | (lineages.depth != births.depth[at])
+    return [
+        Check.of(_UNDER_WAY, _GROUP, ~there, lineages.uid),
+        Check.of(
+            "lineages under way have the niche and depth of their births", _GROUP, odd & there, lineages.uid
+        ),
     ]

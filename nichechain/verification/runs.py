@@ -9,10 +9,11 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from nichechain.archive.read import Meta
+from nichechain.archive.read import Meta, calibrations_of
 from nichechain.births.table import NONE
 from nichechain.domains.base import Evaluation
 from nichechain.search.config import BuildConfig
+from nichechain.search.lineages import Calibration
 
 Ints = NDArray[np.int64]
 Floats = NDArray[np.float64]
@@ -28,7 +29,7 @@ class Births:
     run, uid, parent_uid, depth, parent_niche, child_niche, step : (N,) int64 arrays
     behavior : (N, B) float64 array
     objective : (N,) float64 array
-    accepted : (N,) bool array
+    accepted, lineage : (N,) bool arrays
         False where null.
     failed : (N,) bool array
     reasons : (N,) array of str
@@ -45,6 +46,7 @@ class Births:
     behavior: Floats
     objective: Floats
     accepted: Bools
+    lineage: Bools
     failed: Bools
     reasons: NDArray[np.object_]
 
@@ -72,6 +74,7 @@ class Births:
             behavior=np.stack([real(name) for name in axes], axis=1),
             objective=real("objective"),
             accepted=table["accepted"].fill_null(False).to_numpy().astype(bool),
+            lineage=table["lineage"].fill_null(False).to_numpy().astype(bool),
             failed=table["failed"].is_valid().to_numpy().astype(bool),
             reasons=np.array(table["failed"].fill_null("").to_pylist(), object),
         )
@@ -104,12 +107,15 @@ class Run:
     config : BuildConfig
     first_uid, births : int
         Its births are those from ``first_uid`` on.
+    calibrations : tuple of Calibration
+        Those births that were added to its build, by their numbers within the run.
     """
 
     number: int
     config: BuildConfig
     first_uid: int
     births: int
+    calibrations: tuple[Calibration, ...] = ()
 
     @property
     def rows(self) -> slice:
@@ -126,11 +132,12 @@ def runs_of(meta: Meta) -> Iterator[Run]:
         If the configuration of a merged run is none.
     """
     if meta.origin is None:
-        yield Run(0, meta.config, 0, meta.births)
+        yield Run(0, meta.config, 0, meta.births, meta.calibrations)
     elif meta.origin["kind"] == "merged":
         for number, run in enumerate(meta.origin["runs"]):
             config = BuildConfig.from_json(run["config"])
-            yield Run(number, config, int(run["first_uid"]), int(run["births"]))
+            births = int(run["births"])
+            yield Run(number, config, int(run["first_uid"]), births, calibrations_of(run, births))
 
 
 def differs(first: NDArray[np.generic], second: NDArray[np.generic]) -> Bools:

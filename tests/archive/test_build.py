@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from numpy.typing import ArrayLike, NDArray
 
-from nichechain.archive import build as building
+from nichechain.archive import filling as building
 from nichechain.archive import read, write
 from nichechain.archive.build import Progress, build
 from nichechain.core.errors import ArchiveError, NichechainError
