@@ -274,7 +274,7 @@ def _shipped(path: Path) -> Path | None:
 
 def _shipped_roots() -> tuple[Path, Path]:
     """Where a wheel puts shipped archives, and where a checkout has them."""
-    package = Path(__file__).resolve().parent
+    package = Path(__file__).resolve().parents[1]
     return package / "archives", package.parent / "archives"
 
 

@@ -138,7 +138,7 @@ class NicheChain:
             return "outside"
         return str(state) if self.niches is None else self.niches.label(state)
 
-    def niche_evolvability(self, l: int = 5, lineages: int = 100, **options: Any) -> Floats:  # noqa: E741
+    def niche_evolvability(self, l: int = 5, lineages: int = 100, **options: Any) -> Floats:
         """l-evolvability of every niche, (n_niches,).
 
         The values of :func:`nichechain.evolvability.niche_evolvability`, which takes the same

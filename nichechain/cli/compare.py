@@ -30,7 +30,7 @@ class Compare:
     """Archive folder, or the name of an archive that ships with nichechain."""
     second: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="B")]
     """Another: operators, seeds, searches or domains may differ, niches not."""
-    l: int = 5  # noqa: E741  # the paper's name
+    l: int = 5
     """Generations to look ahead."""
     lineages: int = 100
     """Independent lineages U: l times U descendants."""
@@ -51,10 +51,10 @@ def run(arguments: Sequence[str]) -> int:
     command = console.parse(Compare, arguments)
     from nichechain.archive import read
     from nichechain.archive.archive import load
-    from nichechain.evolvability.coverage import check_lengths
+    from nichechain.evolvability.question import Question
     from nichechain.validation.contrast import contrast
 
-    check_lengths(command.l, command.lineages)
+    Question(command.l, command.lineages)
     if command.seed < 0:
         raise NichechainError(f"--seed is {command.seed}, but must not be negative")
     archives = load(command.first), load(command.second)

@@ -27,7 +27,7 @@ class Evolvability:
 
     path: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="PATH")]
     """Archive folder, or the name of an archive that ships with nichechain."""
-    l: int = 5  # noqa: E741  # the paper's name
+    l: int = 5
     """Generations to look ahead."""
     lineages: int = 100
     """Independent lineages U: l times U descendants."""
@@ -76,9 +76,9 @@ def run(arguments: Sequence[str]) -> int:
     command = console.parse(Evolvability, arguments)
     _check(command)
     from nichechain.archive.archive import load
-    from nichechain.evolvability.coverage import check_lengths
+    from nichechain.evolvability.question import Question
 
-    check_lengths(command.l, command.lineages)
+    Question(command.l, command.lineages)
     archive = load(command.path)
     chain = archive.chain(command.estimator, unvisited=command.unvisited)
     if command.niche is not None or command.elite is not None:

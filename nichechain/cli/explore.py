@@ -24,7 +24,7 @@ class Explore:
     """Archive folder, or the name of an archive that ships with nichechain."""
     out: Path = Path("explore.html")
     """Page to write."""
-    l: int = 5  # noqa: E741  # the paper's name
+    l: int = 5
     """Generations that it shows first, 1 to 10."""
     lineages: int = 100
     """Lineages U that it shows first."""

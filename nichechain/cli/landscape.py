@@ -44,7 +44,7 @@ class LandscapeCommand:
     """Measure so many elites, drawn at random; a larger sample holds a smaller one."""
     share: float = 0.1
     """Quantile of r* up to which an elite is a dissimilum."""
-    l: int = 5  # noqa: E741  # the paper's name
+    l: int = 5
     """Generations, for the l-evolvability that the measures are compared with."""
     lineages: int = 100
     """Lineages, for l-evolvability."""
@@ -77,14 +77,14 @@ def run(arguments: Sequence[str]) -> int:
     command = console.parse(LandscapeCommand, arguments, name="landscape")
     from nichechain import execution
     from nichechain.archive.archive import load
-    from nichechain.evolvability.coverage import check_lengths
+    from nichechain.evolvability.question import Question
     from nichechain.landscape import find_measure, find_measures, measure_archive
     from nichechain.landscape.measures import check_sample_size
     from nichechain.search.making import make_mutation
     from nichechain.variation import SelfAdaptiveDomain
 
     check_sample_size(command.offspring)
-    check_lengths(command.l, command.lineages)
+    Question(command.l, command.lineages)
     for name in ("top", "min_births"):
         if getattr(command, name) < 0:
             option = name.replace("_", "-")

@@ -53,7 +53,7 @@ class Plot:
     growth. Matrices: transitions, transitions-by-class."""
     out: Annotated[Path | None, console.option("FILE", "KIND.png")] = None
     """Picture to write: .png, .svg or .pdf."""
-    l: int = 5  # noqa: E741  # the paper's name
+    l: int = 5
     """Generations, for evolvability and reach."""
     lineages: int = 100
     """Lineages, for evolvability and reach."""

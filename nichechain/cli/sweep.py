@@ -29,7 +29,7 @@ class Sweep:
     """Cells along every axis, such as 5,10,20, or along each one, such as 10x20,20x40."""
     behavior: Annotated[str | None, console.option("X,Y", "that of the parent with the most children")] = None
     """Behavior whose niche is scored on every grid."""
-    l: int = 5  # noqa: E741  # the paper's name
+    l: int = 5
     """Generations, for the score."""
     lineages: int = 100
     """Lineages, for the score."""

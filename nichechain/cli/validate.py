@@ -33,7 +33,7 @@ class Validate:
     """Elites to run lineages from, spread over what the chain predicts."""
     lineages: int = 20
     """Lineages U from each elite."""
-    l: int = 5  # noqa: E741  # the paper's name
+    l: int = 5
     """Generations of a lineage."""
     permutations: int = 499
     """Permutations of each test."""

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import math
 import operator
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from numbers import Integral, Real
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, Literal, TypeAlias
 
 from nichechain.core.errors import NichechainError
 
 DomainOption: TypeAlias = str | int | float | bool
 """What a domain can be told besides its seed."""
+StepBound = Literal["per-coordinate", "rescaled"]
+"""How steps of mutation may be bounded."""
 
 if TYPE_CHECKING:
     # A configuration is checked without NumPy, which takes its time to import.
@@ -48,6 +50,68 @@ def check_numbers(**values: object) -> None:
     for name, value in values.items():
         if not isinstance(value, Real):
             raise NichechainError(f"{name} is {value!r}, but must be a number")
+
+
+def check_at_least(least: int, **values: object) -> None:
+    """Refuse what is no whole number, or too small a one.
+
+    Parameters
+    ----------
+    least : int
+    **values
+        By the names that the caller knows them by.
+
+    Raises
+    ------
+    NichechainError
+        If a value is no whole number, or below the least.
+    """
+    check_whole(**values)
+    for name, value in values.items():
+        if value < least:  # type: ignore[operator]
+            allowed = f"be at least {least}" if least else "not be negative"
+            raise NichechainError(f"{name} is {value}, but must {allowed}")
+
+
+def check_positive(**values: object) -> None:
+    """Refuse what is no finite number above 0.
+
+    Raises
+    ------
+    NichechainError
+        If a value is none.
+    """
+    check_numbers(**values)
+    for name, value in values.items():
+        if not 0 < value < math.inf:  # type: ignore[operator]
+            raise NichechainError(f"{name} is {value}, but must be a positive number")
+
+
+def check_share(**values: object) -> None:
+    """Refuse what is no share of something, of which there is some: above 0 and at most 1.
+
+    Raises
+    ------
+    NichechainError
+        If a value is none.
+    """
+    check_numbers(**values)
+    for name, value in values.items():
+        if not 0 < value <= 1:  # type: ignore[operator]
+            raise NichechainError(f"{name} is {value}, but must be above 0 and at most 1")
+
+
+def check_choice(name: str, value: object, allowed: Iterable[str]) -> None:
+    """Refuse what is none of some words.
+
+    Raises
+    ------
+    NichechainError
+        If it is none; the message names those that are allowed.
+    """
+    words = tuple(allowed)
+    if not isinstance(value, str) or value not in words:
+        raise NichechainError(f"{name} is {value!r}, but must be one of {', '.join(words)}")
 
 
 def check_seed(seed: object) -> None:

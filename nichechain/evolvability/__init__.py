@@ -6,9 +6,9 @@ niches in expectation. Two conventions give the paper's "walks of length l + 1" 
 the paper demands. Under ``procedure`` the root's state counts, as its steps say literally.
 """
 
-from nichechain.evolvability.averaging import DRAWS, Convention, Method
 from nichechain.evolvability.genotypes import FirstGeneration, genotype_evolvability
 from nichechain.evolvability.niches import l_evolvability, niche_evolvability
+from nichechain.evolvability.question import DRAWS, Convention, Method, Question
 from nichechain.evolvability.results import Evolvability, NicheEvolvability
 from nichechain.evolvability.uncertainty import NicheBand, bootstrap_elites, prior_sensitivity
 
@@ -20,6 +20,7 @@ __all__ = [
     "Method",
     "NicheBand",
     "NicheEvolvability",
+    "Question",
     "bootstrap_elites",
     "genotype_evolvability",
     "l_evolvability",

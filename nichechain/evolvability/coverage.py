@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import Protocol
 
 import numpy as np
@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 from scipy.special import gammaln
 
-from nichechain.core.checks import as_whole, check_whole
+from nichechain.core.checks import as_whole, check_at_least, check_whole
 from nichechain.core.errors import NichechainError
 from nichechain.core.row_sampler import RowSampler
 
@@ -41,7 +41,7 @@ class LinearMap(Protocol):
 def expected_coverage(
     transition: LinearMap,
     first: LinearMap,
-    generations: int,
+    steps: int,
     lineages: ArrayLike,
     *,
     counted: int | None = None,
@@ -55,8 +55,8 @@ def expected_coverage(
         ``transition[i, j]`` = P(child in state j | parent in state i).
     first : (m, S) map
         Distribution of generation 1 for each of m roots; ``transition`` itself for all states.
-    generations : int
-        Length l of a lineage, at least 1.
+    steps : int
+        States of a lineage that count, at least 1: its l generations.
     lineages : int or (k,) ints
         Number U of independent lineages per root, at least 1; several are answered together.
     counted : int, optional
@@ -72,7 +72,7 @@ def expected_coverage(
     Raises
     ------
     NichechainError
-        If ``generations`` or ``lineages`` is below 1.
+        If ``steps`` or ``lineages`` is below 1.
 
     Notes
     -----
@@ -80,18 +80,18 @@ def expected_coverage(
     visits niche j.
     """
     sizes = _sizes(lineages)
-    check_lengths(generations, sizes.min())
+    check_at_least(1, steps=steps)
     coverage = np.zeros((first.shape[0], sizes.size))
-    for _, visited in visit_probabilities(transition, first, generations, counted, columns):
-        for k, size in enumerate(sizes):
-            coverage[:, k] += _at_least_once(visited, int(size)).sum(axis=1)
+    for _, visited in visit_probabilities(transition, first, steps, counted, columns):
+        for k, some in enumerate(at_least_once(visited, sizes)):
+            coverage[:, k] += some.sum(axis=1)
     return coverage if np.ndim(lineages) else coverage[:, 0]
 
 
 def visit_probabilities(
     transition: LinearMap,
     first: LinearMap,
-    generations: int,
+    steps: int,
     counted: int | None = None,
     columns: int = _COLUMNS,
 ) -> Iterator[tuple[Ints, Floats]]:
@@ -110,15 +110,13 @@ def visit_probabilities(
     """
     states = transition.shape[0]
     niches = _counted(counted, states)
-    check_whole(columns=columns)
-    if columns < 1:
-        raise NichechainError(f"columns is {columns}, but must be at least 1")
+    check_at_least(1, columns=columns)
     transition = _faster(transition)
     for start in range(0, niches, columns):
         targets = np.arange(start, min(start + columns, niches))
         hit = np.zeros((states, targets.size))
         hit[targets, targets - start] = 1.0
-        for _ in range(generations - 1):
+        for _ in range(steps - 1):
             hit = transition @ hit
             # A lineage that stands on its target has visited it, wherever it goes next.
             hit[targets, targets - start] = 1.0
@@ -126,7 +124,7 @@ def visit_probabilities(
 
 
 def coverage_by_generation(
-    transition: LinearMap, roots: ArrayLike, generations: int, lineages: ArrayLike, counted: int
+    transition: LinearMap, roots: ArrayLike, longest: int, lineages: ArrayLike, counted: int
 ) -> Floats:
     """Expected niches that lineages of roots visit, for every length up to the longest.
 
@@ -135,8 +133,8 @@ def coverage_by_generation(
     transition : (S, S) row-stochastic matrix
     roots : (m,) ints
         States that the roots stand in; generation 1 is drawn from their rows.
-    generations : int
-        The longest lineage l, at least 1.
+    longest : int
+        Generations l of the longest lineage, at least 1.
     lineages : (k,) ints
         Numbers U of lineages, each at least 1.
     counted : int
@@ -144,7 +142,7 @@ def coverage_by_generation(
 
     Returns
     -------
-    (m, generations, k) float64 array
+    (m, longest, k) float64 array
         Entry [i, g − 1, u] is what :func:`expected_coverage` gives for g
         generations.
 
@@ -159,28 +157,35 @@ def coverage_by_generation(
         raise NichechainError(f"roots are {states.tolist()}, but must be states from 0 to {size - 1}")
     counted = _counted(counted, size)
     sizes = _sizes(lineages)
-    check_lengths(generations, sizes.min())
+    check_at_least(1, longest=longest)
     transition = _faster(transition)
-    found = np.zeros((states.size, generations, sizes.size))
+    found = np.zeros((states.size, longest, sizes.size))
     for start in range(0, counted, _COLUMNS):
         targets = np.arange(start, min(start + _COLUMNS, counted))
         hit = np.zeros((transition.shape[0], targets.size))
         hit[targets, targets - start] = 1.0
-        for step in range(generations):
+        for step in range(longest):
             hit = transition @ hit
-            with np.errstate(divide="ignore"):
-                missed = np.log1p(-np.minimum(hit[states], 1.0))
-            for k, size in enumerate(sizes):
-                found[:, step, k] -= np.expm1(int(size) * missed).sum(axis=1)
+            for k, some in enumerate(at_least_once(hit[states], sizes)):
+                found[:, step, k] += some.sum(axis=1)
             # A lineage that stands on its target has visited it, wherever it goes next.
             hit[targets, targets - start] = 1.0
     return found
 
 
+def at_least_once(probability: Floats, trials: Iterable[int]) -> Iterator[Floats]:
+    """P(an event of this probability happens in at least one trial), for each number of trials."""
+    # log1p and expm1 keep the digits of a tiny probability, which 1 - (1 - h)**U rounds away.
+    with np.errstate(divide="ignore"):
+        missed = np.log1p(-np.minimum(probability, 1.0))
+    for number in trials:
+        yield -np.expm1(number * missed)
+
+
 def sampled_coverage(
     transition: LinearMap,
     first: Floats,
-    generations: int,
+    steps: int,
     lineages: int,
     repeats: int,
     rng: np.random.Generator,
@@ -194,7 +199,7 @@ def sampled_coverage(
     transition : (S, S) row-stochastic matrix
     first : (S,) array
         Distribution of generation 1.
-    generations, lineages : int
+    steps, lineages : int
         Length and number of the walks of one repeat, at least 1.
     repeats : int
         How often to repeat, at least 1.
@@ -211,10 +216,7 @@ def sampled_coverage(
     NichechainError
         If a number is below 1, or T has too many entries to walk by.
     """
-    check_lengths(generations, lineages)
-    check_whole(repeats=repeats)
-    if repeats < 1:
-        raise NichechainError(f"repeats is {repeats}, but at least 1 is needed")
+    check_at_least(1, steps=steps, lineages=lineages, repeats=repeats)
     states = transition.shape[0]
     niches = _counted(counted, states)
     step = RowSampler(entries(transition))
@@ -227,7 +229,7 @@ def sampled_coverage(
         seen = np.zeros((size, states), bool)
         here = start.draw(np.zeros(size * lineages, np.int64), rng)
         seen[repeat, here] = True
-        for _ in range(generations - 1):
+        for _ in range(steps - 1):
             here = step.draw(here, rng)
             seen[repeat, here] = True
         found.append(np.count_nonzero(seen[:, :niches], axis=1))
@@ -292,22 +294,14 @@ def rarefied_coverage(counts: ArrayLike, size: int, *, counted: int | None = Non
     return float(others.size - np.exp(log_missed).sum())
 
 
-def check_lengths(generations: int, lineages: int) -> None:
-    """Refuse a lineage without generations, none at all, and parts of one."""
-    check_whole(l=generations, lineages=lineages)
-    if generations < 1:
-        raise NichechainError(f"l is {generations}, but a lineage has at least 1 generation")
-    if lineages < 1:
-        raise NichechainError(f"lineages is {lineages}, but at least 1 is needed")
-
-
 def _sizes(lineages: ArrayLike) -> Ints:
-    """Numbers of lineages, (k,); a single one must be whole by its type, as l must."""
+    """Numbers of lineages, (k,); a single one must be whole by its type, as steps must."""
     if np.ndim(lineages) == 0:
         check_whole(lineages=lineages)
     sizes = np.atleast_1d(as_whole("lineages", lineages))
     if sizes.ndim != 1 or not sizes.size:
         raise NichechainError(f"lineages has shape {sizes.shape}, but must be one or more numbers")
+    check_at_least(1, lineages=int(sizes.min()))
     return sizes
 
 
@@ -327,11 +321,3 @@ def _faster(transition: LinearMap) -> LinearMap:
         dense: Floats = transition.toarray()  # type: ignore[attr-defined]
         return dense
     return transition
-
-
-def _at_least_once(probability: Floats, trials: int) -> Floats:
-    """P(an event of this probability happens in at least one of the trials)."""
-    # log1p and expm1 keep the digits of a tiny probability, which 1 - (1 - h)**U rounds away.
-    with np.errstate(divide="ignore"):
-        some: Floats = -np.expm1(trials * np.log1p(-np.minimum(probability, 1.0)))
-    return some

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
-import math
 import warnings
 from collections.abc import Iterator
 from dataclasses import replace
@@ -13,20 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nichechain.chain.model import NicheChain
-from nichechain.core.checks import check_numbers, check_whole
+from nichechain.core.checks import check_at_least, check_choice, check_positive
 from nichechain.core.errors import NichechainError
 from nichechain.core.randomness import Purpose, keyed
-from nichechain.evolvability.averaging import (
-    DRAWS,
-    Convention,
-    Method,
-    Sample,
-    check,
-    one_root,
-)
+from nichechain.evolvability.averaging import Sample, one_root
 from nichechain.evolvability.coverage import rarefied_coverage
+from nichechain.evolvability.question import DRAWS, Convention, Method, Question, Root
 from nichechain.evolvability.results import Evolvability
-from nichechain.evolvability.roots import Root, transition_draws
 
 if TYPE_CHECKING:
     from nichechain.archive.archive import Archive, Elite
@@ -39,7 +30,7 @@ def genotype_evolvability(
     archive: Archive,
     elite: Elite,
     *,
-    l: int = 5,  # noqa: E741
+    l: int = 5,
     lineages: int = 100,
     offspring: int = 30,
     first_generation: FirstGeneration = "posterior",
@@ -90,20 +81,14 @@ def genotype_evolvability(
     -----
     Source: the paper's procedure, steps 2 to 7.
     """
-    check(l, lineages, method, convention, repeats, draws)
-    check_whole(offspring=offspring)
-    if offspring < 1:
-        raise NichechainError(f"offspring is {offspring}, but at least 1 is needed")
-    if first_generation not in get_args(FirstGeneration):
-        raise NichechainError(f"first_generation is {first_generation!r}, but must be posterior or empirical")
+    question = Question(l, lineages, convention, method, repeats, draws, seed)
+    check_at_least(1, offspring=offspring)
+    check_choice("first_generation", first_generation, get_args(FirstGeneration))
     if strength is not None:
-        check_numbers(strength=strength)
-    if strength is not None and not (math.isfinite(strength) and strength > 0):
-        raise NichechainError(f"strength is {strength}, but must be a positive number")
+        check_positive(strength=strength)
     chain = archive.chain() if chain is None else chain
     counts = _offspring_counts(archive, elite, offspring, seed, executor)
     observed = int(counts.sum())
-    births = None if chain.births is None else int(chain.births[elite.state])
     if first_generation == "empirical" and lineages > observed:
         warnings.warn(
             f"{lineages} lineages begin at the niches of {observed} offspring, "
@@ -111,34 +96,41 @@ def genotype_evolvability(
             stacklevel=2,
         )
 
-    if strength is None:
-        strength = 1.0 if chain.posterior is None else chain.posterior.strength
-
     root = Root(chain, niche=elite.state)
+    guessed = first_generation == "posterior"
 
     def samples() -> Iterator[Sample]:
-        matrices = transition_draws(chain, draws, seed)
-        if chain.posterior is None and first_generation == "posterior":
-            # T is given, but D is not.
-            matrices = itertools.repeat(chain.operator, draws)
-        for number, matrix in enumerate(matrices):
-            if first_generation == "empirical":
-                yield matrix, counts[None, :] / observed
-                continue
-            rng = keyed(seed, Purpose.FIRST_GENERATION, number)
-            weight = rng.standard_gamma(counts + strength * root.first(matrix, "definition"))
-            yield matrix, (weight / weight.sum())[None, :]
+        # Where T is given, D is not, if it has to be guessed.
+        for number, matrix in enumerate(question.transitions(chain, redraw=guessed)):
+            if guessed:
+                rng = keyed(seed, Purpose.FIRST_GENERATION, number)
+                yield matrix, draw_children(chain, counts, root.children(matrix), rng, strength)
+            else:
+                yield matrix, counts / observed
 
-    drawn = chain.posterior is not None or first_generation == "posterior"
-    size = max(1, math.ceil(repeats / draws)) if drawn else repeats
-    result = one_root(chain, samples(), l, lineages, method, convention, size, seed)
-    result = replace(result, births=births, offspring=observed)
-    if first_generation == "posterior" and convention == "definition" and l == 1 and lineages <= observed:
+    result = one_root(chain, samples(), question, question.repeats_of_each(chain, redraw=guessed))
+    result = replace(result, births=root.births, offspring=observed)
+    if guessed and question.steps == 1 and lineages <= observed:
         # No distribution has to be guessed: these are children, and there are enough of them.
         value = rarefied_coverage(counts, lineages, counted=chain.n_niches)
         low, high = min(result.low, value), max(result.high, value)
         return replace(result, value=value, standard_error=0.0, low=low, high=high, method="rarefaction")
     return result
+
+
+def draw_children(
+    chain: NicheChain,
+    counts: NDArray[np.int64],
+    row: NDArray[np.float64],
+    rng: np.random.Generator,
+    strength: float | None = None,
+) -> NDArray[np.float64]:
+    """D of genotypes, (..., S), drawn given the states of their offspring and their niche's row of T."""
+    if strength is None:
+        strength = 1.0 if chain.posterior is None else chain.posterior.strength
+    weight: NDArray[np.float64] = rng.standard_gamma(counts + strength * row)
+    weight /= weight.sum(axis=-1, keepdims=True)
+    return weight
 
 
 def _offspring_counts(

@@ -8,23 +8,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
-from nichechain.chain.model import Matrix, NicheChain
+from nichechain.chain.model import NicheChain, Transition
 from nichechain.core.randomness import Purpose, keyed
-from nichechain.evolvability.averaging import (
-    DRAWS,
-    ENDLESS,
-    SATURATED,
-    Convention,
-    Method,
-    check,
-    one_root,
-    repeats_per_draw,
-    standard_error,
-    summary,
-)
+from nichechain.evolvability.averaging import ENDLESS, SATURATED, one_root, standard_error, summary
 from nichechain.evolvability.coverage import expected_coverage, sampled_coverage
+from nichechain.evolvability.question import DRAWS, Convention, Method, Question, Root
 from nichechain.evolvability.results import Evolvability, NicheEvolvability
-from nichechain.evolvability.roots import Root, generations, transition_draws
 from nichechain.niches import Niche
 
 Floats = NDArray[np.float64]
@@ -35,7 +24,7 @@ def l_evolvability(
     *,
     niche: Niche | None = None,
     offspring: ArrayLike | None = None,
-    l: int = 5,  # noqa: E741
+    l: int = 5,
     lineages: int = 100,
     method: Method = "exact",
     convention: Convention = "definition",
@@ -80,21 +69,21 @@ def l_evolvability(
     -----
     Source: the paper's section "Towards better evolvability definitions".
     """
-    check(l, lineages, method, convention, repeats, draws)
-    root = Root(chain, niche=niche, offspring=offspring)
-    samples = (
-        (matrix, root.first(matrix, convention)[None, :]) for matrix in transition_draws(chain, draws, seed)
-    )
-    size = repeats_per_draw(repeats, chain, draws)
-    result = one_root(chain, samples, l, lineages, method, convention, size, seed)
-    known = root.state is not None and chain.births is not None
-    return replace(result, births=int(chain.births[root.state]) if known else None)  # type: ignore[index]
+    question = Question(l, lineages, convention, method, repeats, draws, seed)
+    return answer(chain, Root(chain, niche=niche, offspring=offspring), question)
+
+
+def answer(chain: NicheChain, root: Root, question: Question) -> Evolvability:
+    """What :func:`l_evolvability` answers to a question that has been checked."""
+    samples = ((matrix, root.first(matrix, question)) for matrix in question.transitions(chain))
+    result = one_root(chain, samples, question, question.repeats_of_each(chain))
+    return replace(result, births=root.births)
 
 
 def niche_evolvability(
     chain: NicheChain,
     *,
-    l: int = 5,  # noqa: E741
+    l: int = 5,
     lineages: int = 100,
     method: Method = "exact",
     convention: Convention = "definition",
@@ -118,30 +107,42 @@ def niche_evolvability(
     NichechainError
         If an argument is out of range.
     """
-    check(l, lineages, method, convention, repeats, draws)
-    n = chain.n_niches
-    states_counted = generations(l, convention)
-    size = repeats_per_draw(repeats, chain, draws)
+    return answer_for_niches(chain, Question(l, lineages, convention, method, repeats, draws, seed))
+
+
+def answer_for_niches(chain: NicheChain, question: Question) -> NicheEvolvability:
+    """What :func:`niche_evolvability` answers to a question that has been checked."""
+    n, steps, lineages = chain.n_niches, question.steps, question.lineages
+    size = question.repeats_of_each(chain)
     standing = sparse.eye_array(chain.states, format="csr")
     means, errors, saturated = [], [], False
-    for number, matrix in enumerate(transition_draws(chain, draws, seed)):
-        first: Matrix = standing if convention == "procedure" else matrix
-        if method == "exact":
-            covered = expected_coverage(matrix, first, states_counted, [lineages, ENDLESS], counted=n)[:n]
+    for number, matrix in enumerate(question.transitions(chain)):
+        first: Transition = standing if question.root_counts else matrix
+        if question.method == "exact":
+            covered = expected_coverage(matrix, first, steps, [lineages, ENDLESS], counted=n)[:n]
             saturated |= bool(np.median(covered[:, 0] / np.maximum(covered[:, 1], 1e-300)) > SATURATED)
             means.append(covered[:, 0])
             errors.append(np.zeros(n))
         else:
-            rng = keyed(seed, Purpose.WALKS, number)
-            roots = (Root(chain, niche=niche).first(matrix, convention) for niche in range(n))
+            rng = keyed(question.seed, Purpose.WALKS, number)
+            roots = (Root(chain, niche=niche).first(matrix, question) for niche in range(n))
             sampled = [
-                sampled_coverage(matrix, root, states_counted, lineages, size, rng, counted=n)
-                for root in roots
+                sampled_coverage(matrix, root, steps, lineages, size, rng, counted=n) for root in roots
             ]
             means.append(np.mean(sampled, axis=1))
             errors.append(np.array([standard_error(walks) for walks in sampled]))
     value, error, low, high = summary(np.array(means), np.array(errors))
     births = None if chain.births is None else chain.births[:n]
     return NicheEvolvability(
-        value, error, low, high, births, l, lineages, method, convention, chain.estimator, saturated
+        value,
+        error,
+        low,
+        high,
+        births,
+        question.l,
+        lineages,
+        question.method,
+        question.convention,
+        chain.estimator,
+        saturated,
     )

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import get_args
 
 import numpy as np
 import pandas as pd
@@ -12,12 +11,9 @@ from scipy import sparse
 
 from nichechain.chain.model import NicheChain, Transition
 from nichechain.chain.operator import PooledTransition
-from nichechain.core.checks import check_whole
-from nichechain.core.errors import NichechainError
-from nichechain.evolvability import DRAWS, Convention
-from nichechain.evolvability.coverage import check_lengths, visit_probabilities
+from nichechain.evolvability.coverage import at_least_once, visit_probabilities
+from nichechain.evolvability.question import DRAWS, Convention, Question, Root
 from nichechain.evolvability.returns import return_probabilities
-from nichechain.evolvability.roots import Root, generations, transition_draws
 from nichechain.niches import Niche
 
 Floats = NDArray[np.float64]
@@ -54,7 +50,7 @@ class Reach:
     expected_visits: Floats
     low: Floats
     high: Floats
-    l: int  # noqa: E741  # the paper's name
+    l: int
     lineages: int
     convention: str
     estimator: str
@@ -86,7 +82,7 @@ def reach(
     *,
     niche: Niche | None = None,
     offspring: ArrayLike | None = None,
-    l: int = 5,  # noqa: E741
+    l: int = 5,
     lineages: int = 100,
     convention: Convention = "definition",
     draws: int = DRAWS,
@@ -125,22 +121,17 @@ def reach(
     -----
     The niches that the paper's section "Towards better evolvability definitions" counts.
     """
-    check_lengths(l, lineages)
-    check_draws(convention, draws)
+    question = Question(l, lineages, convention, draws=draws, seed=seed)
     root = Root(chain, niche=niche, offspring=offspring)
     n = chain.n_niches
-    visits, descendants, some = [], [], []
-    for transition in transition_draws(chain, draws, seed):
-        visit, passes = visit_probability(
-            transition, root.first(transition, convention), generations(l, convention)
-        )
+    visits, descendants = [], []
+    some: list[Floats] = []
+    for transition in question.transitions(chain):
+        visit, passes = visit_probability(transition, root.first(transition, question), question.steps)
         visits.append(visit[:n])
         descendants.append(lineages * passes[:n])
-        with np.errstate(divide="ignore"):
-            # The digits of a tiny probability would be lost in 1 − (1 − h)^U.
-            some.append(-np.expm1(lineages * np.log1p(-visit[:n])))
+        some.extend(at_least_once(visit[:n], [lineages]))
     low, high = np.quantile(some, (0.05, 0.95), axis=0)
-    births = chain.births
     return Reach(
         np.mean(visits, axis=0),
         np.mean(some, axis=0),
@@ -151,7 +142,7 @@ def reach(
         lineages,
         convention,
         chain.estimator,
-        None if root.state is None or births is None else int(births[root.state]),
+        root.births,
     )
 
 
@@ -205,14 +196,3 @@ def visit_probability(transition: Transition, first: Floats, steps: int) -> tupl
             earlier = new[:k, again] * returns[k - 1 :: -1]
             new[k, again] = np.maximum(present[k, again] - earlier.sum(axis=0), 0.0)
     return np.clip(new.sum(axis=0), 0.0, 1.0), passes
-
-
-def check_draws(convention: str, draws: int) -> None:
-    """Refuse an unknown convention, or no draws at all."""
-    if convention not in get_args(Convention):
-        raise NichechainError(
-            f"convention is {convention!r}, but must be one of {', '.join(get_args(Convention))}"
-        )
-    check_whole(draws=draws)
-    if draws < 1:
-        raise NichechainError(f"draws is {draws}, but at least 1 is needed")

@@ -46,7 +46,7 @@ class Evolvability:
     standard_error: float
     low: float
     high: float
-    l: int  # noqa: E741  # the paper's name
+    l: int
     lineages: int
     method: str
     convention: str
@@ -85,7 +85,7 @@ class NicheEvolvability:
     low: Floats
     high: Floats
     births: NDArray[np.int64] | None
-    l: int  # noqa: E741
+    l: int
     lineages: int
     method: str
     convention: str

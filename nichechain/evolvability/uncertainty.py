@@ -7,7 +7,7 @@ sample of their niche. A band over priors questions the first, a bootstrap over 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -20,11 +20,11 @@ from nichechain.chain.estimators import with_posterior
 from nichechain.chain.families import counts_of_families, families_of
 from nichechain.chain.model import NicheChain
 from nichechain.chain.posterior import DirichletPosterior
-from nichechain.core.checks import check_numbers, check_whole
+from nichechain.core.checks import check_at_least, check_numbers
 from nichechain.core.errors import NichechainError
 from nichechain.core.randomness import Purpose, keyed
-from nichechain.evolvability.averaging import DRAWS, Convention
-from nichechain.evolvability.niches import niche_evolvability
+from nichechain.evolvability.niches import answer_for_niches
+from nichechain.evolvability.question import DRAWS, Convention, Question
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -59,7 +59,7 @@ class NicheBand:
 def prior_sensitivity(
     counts: TransitionCounts,
     *,
-    l: int = 5,  # noqa: E741
+    l: int = 5,
     lineages: int = 100,
     convention: Convention = "definition",
     draws: int = 20,
@@ -98,6 +98,7 @@ def prior_sensitivity(
     Theory and Bayesian Analysis, section 4.7. The band is no interval of a given probability. It
     contains the error of the draws, which :attr:`NicheEvolvability.standard_error` tells.
     """
+    question = Question(l, lineages, convention, draws=draws, seed=seed)
     check_numbers(factor=factor)
     if not (math.isfinite(factor) and factor > 1):
         raise NichechainError(f"factor is {factor:g}, but must be a number greater than 1")
@@ -114,14 +115,7 @@ def prior_sensitivity(
     }
     values = np.array(
         [
-            niche_evolvability(
-                _chain(counts, s, mixture, effect),
-                l=l,
-                lineages=lineages,
-                convention=convention,
-                draws=draws,
-                seed=seed,
-            ).value
+            answer_for_niches(_chain(counts, s, mixture, effect), question).value
             for s, mixture in priors.values()
         ]
     )
@@ -132,7 +126,7 @@ def bootstrap_elites(
     counts: TransitionCounts,
     *,
     resamples: int = 50,
-    l: int = 5,  # noqa: E741
+    l: int = 5,
     lineages: int = 100,
     convention: Convention = "definition",
     draws: int = 5,
@@ -175,9 +169,8 @@ def bootstrap_elites(
     niche of m elites the spread is short by √((m − 1)/m), so a niche of one elite adds none.
     What the few draws of each resample leave open adds to the spread.
     """
-    check_whole(resamples=resamples)
-    if resamples < 2:
-        raise NichechainError(f"resamples is {resamples}, but must be at least 2")
+    question = Question(l, lineages, convention, draws=draws, seed=seed)
+    check_at_least(2, resamples=resamples)
     if not len(counts.families):
         raise NichechainError(
             "these births do not say whose children they are, so elites cannot be resampled"
@@ -185,17 +178,14 @@ def bootstrap_elites(
     effect = design_effect(counts)
     strength, weights = most_likely(counts, effect)
 
-    def values(of: TransitionCounts, draws: int) -> Floats:
-        chain = _chain(of, strength, weights, effect)
-        return niche_evolvability(
-            chain, l=l, lineages=lineages, convention=convention, draws=draws, seed=seed
-        ).value
+    def values(of: TransitionCounts, question: Question) -> Floats:
+        return answer_for_niches(_chain(of, strength, weights, effect), question).value
 
-    value = values(counts, DRAWS)
+    value = values(counts, replace(question, draws=DRAWS))
     elites = _Elites(counts)
     again = np.array(
         [
-            values(elites.resampled(keyed(seed, Purpose.RESAMPLING, number)), draws)
+            values(elites.resampled(keyed(seed, Purpose.RESAMPLING, number)), question)
             for number in range(resamples)
         ]
     )

@@ -12,14 +12,12 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
 from nichechain.chain.model import NicheChain, Transition
-from nichechain.core.checks import as_floats, check_whole
+from nichechain.core.checks import as_floats
 from nichechain.core.errors import NichechainError
 from nichechain.core.randomness import Purpose, keyed
 from nichechain.core.row_sampler import RowSampler
-from nichechain.evolvability import DRAWS, Convention
-from nichechain.evolvability.coverage import check_lengths, entries
-from nichechain.evolvability.reach import check_draws
-from nichechain.evolvability.roots import Root, generations, transition_draws
+from nichechain.evolvability.coverage import entries
+from nichechain.evolvability.question import DRAWS, Convention, Question, Root
 from nichechain.niches import Niche
 
 Floats = NDArray[np.float64]
@@ -70,7 +68,7 @@ class VisitMetrics:
     entropy: Estimate
     distance: Estimate
     inside: float
-    l: int  # noqa: E741  # the paper's name
+    l: int
     lineages: int
     repeats: int
     convention: str
@@ -82,7 +80,7 @@ def visit_metrics(
     *,
     niche: Niche | None = None,
     offspring: ArrayLike | None = None,
-    l: int = 5,  # noqa: E741
+    l: int = 5,
     lineages: int = 100,
     convention: Convention = "definition",
     repeats: int = 100,
@@ -114,20 +112,15 @@ def visit_metrics(
     "Novelty search makes evolvability inevitable". Few descendants in many niches are never quite
     uniform: compare uniformity and entropy at equal l and U only.
     """
-    check_lengths(l, lineages)
-    check_draws(convention, draws)
-    check_whole(repeats=repeats)
-    if repeats < 1:
-        raise NichechainError(f"repeats is {repeats}, but at least 1 is needed")
+    question = Question(l, lineages, convention, repeats=repeats, draws=draws, seed=seed)
     root = Root(chain, niche=niche, offspring=offspring)
-    steps = generations(l, convention)
-    size = repeats if chain.posterior is None else max(1, math.ceil(repeats / draws))
-    start = root.state if convention == "definition" else None
+    size = question.repeats_of_each(chain)
+    start = None if question.root_counts else root.state
     samples = []
-    for number, transition in enumerate(transition_draws(chain, draws, seed)):
+    for number, transition in enumerate(question.transitions(chain)):
         rng = keyed(seed, Purpose.WALKS, number)
-        first = root.first(transition, convention)
-        walks = _walks(transition, first, start, steps, lineages, size, rng, chain)
+        first = root.first(transition, question)
+        walks = _walks(transition, first, start, question.steps, lineages, size, rng, chain)
         samples.append(np.concatenate(list(walks), axis=1))
     found = np.stack(samples)
     coverage, uniformity, occupied, entropy, distance = (_estimate(found[:, k]) for k in range(5))

@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from typing import get_args
-
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 from scipy import sparse
 
-from nichechain.chain.model import Matrix, NicheChain
-from nichechain.core.checks import check_whole
+from nichechain.chain.model import Matrix, NicheChain, Transition
+from nichechain.core.checks import check_at_least
 from nichechain.core.errors import NichechainError
-from nichechain.evolvability import DRAWS, Convention
-from nichechain.evolvability.coverage import check_lengths, expected_coverage
-from nichechain.evolvability.roots import generations, transition_draws
+from nichechain.evolvability.coverage import expected_coverage
+from nichechain.evolvability.question import DRAWS, Convention, Question
 from nichechain.niches import Niche
 
 Floats = NDArray[np.float64]
@@ -26,7 +23,7 @@ def where_to_sample(
     chain: NicheChain,
     *,
     niche: Niche | None = None,
-    l: int = 5,  # noqa: E741  # the paper's name
+    l: int = 5,
     lineages: int = 100,
     convention: Convention = "definition",
     births: int = 1,
@@ -74,11 +71,9 @@ def where_to_sample(
     m / (m + e α), as the posterior mean of a Dirichlet row is linear in what is seen. Memory and
     time are those of dense (S, S) matrices.
     """
-    check_whole(births=births, draws=draws)
-    if births < 1:
-        raise NichechainError(f"births is {births}, but at least 1 is needed")
-    if draws < 2:
-        raise NichechainError(f"draws is {draws}, but at least 2 are needed")
+    check_at_least(1, births=births)
+    check_at_least(2, draws=draws)
+    question = Question(l, lineages, convention, draws=draws, seed=seed)
     if chain.posterior is None or chain.counts is None:
         raise NichechainError(
             f"more births narrow nothing in a chain that is {chain.estimator}: "
@@ -86,15 +81,15 @@ def where_to_sample(
         )
     posterior = chain.posterior
     mean = posterior.mean()
-    slope = evolvability_derivative(chain, niche=niche, l=l, lineages=lineages, convention=convention)
+    slope = _derivative(chain, niche, question)
     spread = np.maximum((mean * slope**2).sum(axis=1) - (mean * slope).sum(axis=1) ** 2, 0.0)
     total = np.asarray(posterior.weights.sum(axis=1)).ravel() + posterior.strength
     parts = spread / (total + 1.0)
     share = parts / parts.sum() if parts.any() else parts
     weight = _weight(chain, niche)
     values = [
-        _evolvability(transition, weight, l, lineages, convention, chain.n_niches)
-        for transition in transition_draws(chain, draws, seed)
+        _evolvability(transition, weight, question, chain.n_niches)
+        for transition in question.transitions(chain)
     ]
     variance = share * np.var(values, ddof=1)
     frame = pd.DataFrame(
@@ -116,7 +111,7 @@ def evolvability_derivative(
     chain: NicheChain,
     *,
     niche: Niche | None = None,
-    l: int = 5,  # noqa: E741
+    l: int = 5,
     lineages: int = 100,
     convention: Convention = "definition",
 ) -> Floats:
@@ -146,11 +141,10 @@ def evolvability_derivative(
     backwards for a block of target niches at a time: all S² derivatives for about three times the work of
     l-evolvability itself, and as many products of dense matrices as there are generations.
     """
-    check_lengths(l, lineages)
-    if convention not in get_args(Convention):
-        raise NichechainError(
-            f"convention is {convention!r}, but must be one of {', '.join(get_args(Convention))}"
-        )
+    return _derivative(chain, niche, Question(l, lineages, convention))
+
+
+def _derivative(chain: NicheChain, niche: Niche | None, question: Question) -> Floats:
     states, n = chain.states, chain.n_niches
     weight = _weight(chain, niche)
     matrix = chain.T
@@ -161,15 +155,15 @@ def evolvability_derivative(
         on_target = targets, targets - start
         hits = [np.zeros((states, targets.size))]
         hits[0][on_target] = 1.0
-        for _ in range(generations(l, convention) - 1):
+        for _ in range(question.steps - 1):
             onward = matrix @ hits[-1]
             onward[on_target] = 1.0
             hits.append(onward)
-        if convention == "procedure":
-            pull = _pull(hits[-1], weight, lineages)
+        if question.root_counts:
+            pull = _pull(hits[-1], weight, question.lineages)
         else:
             # The first generation is drawn from the root's row, which is a transition as well.
-            drawn = _pull(matrix @ hits[-1], weight, lineages)
+            drawn = _pull(matrix @ hits[-1], weight, question.lineages)
             slope += drawn @ hits[-1].T
             pull = back @ drawn
         for earlier in reversed(hits[:-1]):
@@ -190,19 +184,12 @@ def _weight(chain: NicheChain, niche: Niche | None) -> Floats:
     return weight
 
 
-def _evolvability(
-    transition: Matrix,
-    weight: Floats,
-    l: int,  # noqa: E741
-    lineages: int,
-    convention: str,
-    niches: int,
-) -> float:
+def _evolvability(transition: Transition, weight: Floats, question: Question, niches: int) -> float:
     """Weighted mean of the l-evolvability of all roots that have a weight."""
     roots = np.flatnonzero(weight)
     standing = sparse.eye_array(weight.size, format="csr")[roots]
-    first = standing if convention == "procedure" else standing @ transition
-    covered = expected_coverage(transition, first, generations(l, convention), lineages, counted=niches)
+    first = standing if question.root_counts else standing @ transition
+    covered = expected_coverage(transition, first, question.steps, question.lineages, counted=niches)
     return float(weight[roots] @ covered)
 
 

@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nichechain.chain.model import NicheChain
-from nichechain.core.checks import check_whole
+from nichechain.core.checks import check_at_least
 from nichechain.core.errors import NichechainError
 from nichechain.evolvability.averaging import ENDLESS, SATURATED
 from nichechain.evolvability.coverage import coverage_by_generation
-from nichechain.evolvability.roots import transition_draws
+from nichechain.evolvability.question import Question
 from nichechain.niches import Niche
 from nichechain.plots.style import EDGE, INK, LONG_JUMP, START
 
@@ -62,7 +62,9 @@ def plot_generations(
     NichechainError
         If a niche does not exist, a number is out of range, or there are too many niches.
     """
-    covered = _covered(chain, niches, longest, np.array([lineages, ENDLESS]), draws, seed)
+    check_at_least(1, longest=longest)
+    question = Question(longest, lineages, draws=draws, seed=seed)
+    covered = _covered(chain, niches, question, np.array([lineages, ENDLESS]))
     _lines(ax, chain, niches, np.arange(1, longest + 1), covered[..., 0], covered[..., 1])
     ax.set(xlabel="generations l", xlim=(0.5, longest + 0.5), title=f"Against l, {lineages} lineages")
     ax.set_xticks(range(1, longest + 1, 1 + longest // 16))
@@ -74,7 +76,7 @@ def plot_lineages(
     ax: Axes,
     *,
     niches: Sequence[Niche],
-    l: int = 5,  # noqa: E741  # the paper's name
+    l: int = 5,
     most: int = 10_000,
     draws: int = 20,
     seed: int = 0,
@@ -99,30 +101,24 @@ def plot_lineages(
     NichechainError
         As in :func:`plot_generations`.
     """
-    check_whole(most=most)
-    if most < 2:
-        raise NichechainError(f"most is {most}, but must be at least 2")
+    question = Question(l, draws=draws, seed=seed)
+    check_at_least(2, most=most)
     sizes = np.unique(np.round(np.geomspace(1, most, 17)).astype(np.int64))
-    covered = _covered(chain, niches, l, np.append(sizes, ENDLESS), draws, seed)[:, :, -1]
+    covered = _covered(chain, niches, question, np.append(sizes, ENDLESS))[:, :, -1]
     _lines(ax, chain, niches, sizes, covered[..., :-1], covered[..., -1:])
     ax.set(xscale="log", xlabel="lineages U", title=f"Against U, {l} generations")
     return ax
 
 
-def _covered(
-    chain: NicheChain, niches: Sequence[Niche], longest: int, lineages: Ints, draws: int, seed: int
-) -> Floats:
+def _covered(chain: NicheChain, niches: Sequence[Niche], question: Question, lineages: Ints) -> Floats:
     """Coverage (draws, niches, generations, lineages)."""
     if not 1 <= len(niches) <= len(_COLORS):
         raise NichechainError(f"{len(niches)} niches are given, but one to {len(_COLORS)} can be told apart")
-    check_whole(draws=draws)
-    if draws < 1:
-        raise NichechainError(f"draws is {draws}, but at least 1 is needed")
     roots = [chain.state(niche) for niche in niches]
     return np.array(
         [
-            coverage_by_generation(matrix, roots, longest, lineages, chain.n_niches)
-            for matrix in transition_draws(chain, draws, seed)
+            coverage_by_generation(matrix, roots, question.l, lineages, chain.n_niches)
+            for matrix in question.transitions(chain)
         ]
     )
 

@@ -7,9 +7,8 @@ from collections.abc import Mapping
 from dataclasses import MISSING, asdict, dataclass, field, fields
 from typing import Any, Literal, get_args
 
-from nichechain.core.checks import DomainOption, as_bounds, as_shape, check_numbers, plain_options
+from nichechain.core.checks import DomainOption, StepBound, as_bounds, as_shape, check_numbers, plain_options
 from nichechain.core.errors import NichechainError
-from nichechain.variation.additive import StepBound
 
 Replacement = Literal["random", "first", "newest", "objective"]
 Outside = Literal["state", "absorb", "clip"]

@@ -16,10 +16,11 @@ from nichechain.chain.base_measure import BaseMeasure
 from nichechain.chain.counts import TransitionCounts
 from nichechain.chain.empirical_bayes import design_effect, most_likely
 from nichechain.chain.posterior import DirichletPosterior
-from nichechain.core.checks import check_whole
+from nichechain.core.checks import check_at_least
 from nichechain.core.errors import NichechainError
 from nichechain.core.randomness import Purpose, keyed
-from nichechain.evolvability.coverage import check_lengths, expected_coverage, rarefied_coverage
+from nichechain.evolvability.coverage import expected_coverage, rarefied_coverage
+from nichechain.evolvability.question import Question
 from nichechain.niches import Niches
 
 Floats = NDArray[np.float64]
@@ -79,7 +80,7 @@ class Contrast:
     niches: int
     clusters: tuple[tuple[str, int], tuple[str, int]]
     births: int
-    l: int  # noqa: E741  # the paper's name
+    l: int
     lineages: int
     min_births: int
     resamples: int
@@ -94,7 +95,7 @@ def contrast(
     second: pa.Table,
     niches: Niches,
     *,
-    l: int = 5,  # noqa: E741
+    l: int = 5,
     lineages: int = 100,
     min_births: int = 20,
     resamples: int = 100,
@@ -139,15 +140,9 @@ def contrast(
     every figure, so only their spread is used: the interval is the difference ± its standard error
     times Student's quantile, and for few runs r the spread is corrected by √(r/(r − 1)).
     """
-    check_lengths(l, lineages)
-    check_whole(resamples=resamples, draws=draws, min_births=min_births)
-    for name, number, least in (
-        ("resamples", resamples, 2),
-        ("draws", draws, 1),
-        ("min_births", min_births, 0),
-    ):
-        if number < least:
-            raise NichechainError(f"{name} is {number}, but must be at least {least}")
+    question = Question(l, lineages, draws=draws, seed=seed)
+    check_at_least(2, resamples=resamples)
+    check_at_least(0, min_births=min_births)
     sides = _Side.of(first, niches), _Side.of(second, niches)
     whole = [side.counts() for side in sides]
     enough = [counts.births[: len(niches)] >= max(1, min_births) for counts in whole]
@@ -165,11 +160,12 @@ def contrast(
         def figures(counts: TransitionCounts, draws: int, rng: np.random.Generator) -> Floats:
             base = BaseMeasure.pooled(counts, weights)  # noqa: B023  # called in this round only
             posterior = DirichletPosterior(counts, base, strength, effect)  # noqa: B023
-            lineages_of = [lineages, 1]
             found = np.zeros(2)
             for _ in range(draws):
                 T = posterior.draw(rng)
-                covered = expected_coverage(T, T[compared], l, lineages_of, counted=len(niches))
+                covered = expected_coverage(
+                    T, T[compared], question.steps, [lineages, 1], counted=len(niches)
+                )
                 found += covered.mean(axis=0) / draws
             visits = counts.visits
             return np.append(

@@ -8,7 +8,6 @@ generation 1 is drawn from the niche's row of T, the root does not count, nor do
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,11 +16,11 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from nichechain.births.table import NONE
-from nichechain.chain.model import Matrix, NicheChain
-from nichechain.core.checks import check_whole
-from nichechain.core.errors import NichechainError
+from nichechain.chain.model import NicheChain
 from nichechain.core.randomness import Purpose, keyed
 from nichechain.evolvability.coverage import expected_coverage, rarefied_coverage
+from nichechain.evolvability.genotypes import draw_children
+from nichechain.evolvability.question import Question
 from nichechain.niches import Niches
 from nichechain.validation.rollouts import Lineages, niches_reached
 from nichechain.validation.simulate import RowSampler, simulate_lineages
@@ -173,20 +172,16 @@ def compare(
     NichechainError
         If ``draws`` is below 1.
     """
-    check_whole(draws=draws)
-    if draws < 1:
-        raise NichechainError(f"draws is {draws}, but at least 1 is needed")
+    question = Question(draws=draws, seed=seed)
     roots, size, generations = lineages.states.shape
     n = chain.n_niches
     counts = np.stack([np.bincount(row[row != NONE], minlength=chain.states) for row in lineages.offspring])
     values: list[Floats] = []
     simulated: list[Ints] = []
-    for number, matrix in enumerate(_transitions(chain, draws, seed)):
+    for number, matrix in enumerate(question.transitions(chain, redraw=True)):
         rows = matrix[lineages.roots] if isinstance(matrix, np.ndarray) else matrix[lineages.roots].toarray()
         rng = keyed(seed, Purpose.FIRST_GENERATION, number)
-        strength = 1.0 if chain.posterior is None else chain.posterior.strength
-        weight = rng.standard_gamma(counts + strength * rows)
-        first = np.concatenate([rows, weight / weight.sum(axis=1, keepdims=True)])
+        first = np.concatenate([rows, draw_children(chain, counts, rows, rng)])
         values.append(
             np.stack(
                 [expected_coverage(matrix, first, k + 1, size, counted=n) for k in range(generations)], axis=1
@@ -213,15 +208,6 @@ def compare(
         ),
         chain.estimator,
     )
-
-
-def _transitions(chain: NicheChain, draws: int, seed: int) -> Iterator[Matrix]:
-    """T in every draw: where it is given, draws differ by chance alone."""
-    for number in range(draws):
-        if chain.posterior is None:
-            yield chain.operator
-        else:
-            yield chain.posterior.draw(keyed(seed, Purpose.POSTERIOR, number))
 
 
 def _spearmans(real: NDArray[np.int64], value: Floats) -> Floats:

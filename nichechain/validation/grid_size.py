@@ -19,11 +19,11 @@ from numpy.typing import NDArray
 from nichechain.births.table import NONE
 from nichechain.chain import NicheChain, TransitionCounts, estimate
 from nichechain.chain.families import counts_of_families, families_of
-from nichechain.core.checks import as_floats, check_whole
+from nichechain.core.checks import as_floats, check_at_least, check_whole
 from nichechain.core.errors import NichechainError
 from nichechain.core.randomness import Purpose, keyed
-from nichechain.evolvability import l_evolvability
-from nichechain.evolvability.coverage import check_lengths
+from nichechain.evolvability.niches import answer
+from nichechain.evolvability.question import Question, Root
 from nichechain.niches import GridNiches
 from nichechain.validation.held_out import probability_of
 
@@ -123,7 +123,7 @@ class Sweep:
     behavior: tuple[float, ...]
     births: int
     built: tuple[int, ...] | None
-    l: int  # noqa: E741  # the paper's name
+    l: int
     lineages: int
     min_births: int
 
@@ -171,7 +171,7 @@ def sweep(
     sizes: Sequence[int | tuple[int, ...]] | None = None,
     *,
     behavior: Sequence[float] | None = None,
-    l: int = 5,  # noqa: E741
+    l: int = 5,
     lineages: int = 100,
     min_births: int = MIN_BIRTHS,
     draws: int = 10,
@@ -216,10 +216,9 @@ def sweep(
         sizes = default_sizes(axes)
     if not sizes:
         raise NichechainError("there are no sizes: give at least one, such as 20")
-    check_lengths(l, lineages)
-    check_whole(min_births=min_births, draws=draws, folds=folds)
-    if folds < 2:
-        raise NichechainError(f"folds is {folds}, but at least 2 are needed")
+    question = Question(l, lineages, draws=draws, seed=seed)
+    check_whole(min_births=min_births)
+    check_at_least(2, folds=folds)
     for size in sizes:
         if not isinstance(size, Sequence):
             check_whole(size=size)
@@ -241,7 +240,7 @@ def sweep(
         counts = _binned(niches, parents, children, elite)
         chain = estimate(counts)
         root = int(niches.of(place[None])[0])
-        score = l_evolvability(chain, niche=root, l=l, lineages=lineages, draws=draws, seed=seed)
+        score = answer(chain, Root(chain, niche=root), question)
         found.append(
             GridSize(
                 niches.shape,

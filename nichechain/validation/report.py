@@ -10,8 +10,9 @@ import numpy as np
 import pandas as pd
 
 from nichechain.archive.archive import Archive
-from nichechain.core.checks import check_seed, check_whole
+from nichechain.core.checks import check_at_least, check_whole
 from nichechain.core.errors import NichechainError
+from nichechain.evolvability.question import Question
 from nichechain.execution import Executor
 from nichechain.validation import chapman_kolmogorov
 from nichechain.validation.direct import DirectCheck, compare
@@ -48,20 +49,17 @@ class ValidationConfig:
 
     elites: int = 24
     lineages: int = 20
-    l: int = 5  # noqa: E741  # the paper's name
+    l: int = 5
     offspring: int = OFFSPRING
     permutations: int = PERMUTATIONS
     seed: int = 0
 
     def __post_init__(self) -> None:
+        Question(self.l, self.lineages, seed=self.seed)
         check_whole(elites=self.elites)
-        for name in ("lineages", "l", "offspring"):
-            check_whole(**{name: getattr(self, name)})
-            if getattr(self, name) < 1:
-                raise NichechainError(f"{name} is {getattr(self, name)}, but must be at least 1")
+        check_at_least(1, offspring=self.offspring)
         if self.elites < 3:
             raise NichechainError(f"elites is {self.elites}, but a rank correlation needs at least 3")
-        check_seed(self.seed)
         check_permutations(self.permutations)
 
     @property

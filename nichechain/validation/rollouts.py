@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 from nichechain.archive.archive import Archive
 from nichechain.births.table import NONE
 from nichechain.chain.model import NicheChain
-from nichechain.core.checks import check_whole
+from nichechain.core.checks import check_at_least, check_whole
 from nichechain.core.errors import NichechainError
 from nichechain.core.randomness import Purpose, keyed
-from nichechain.evolvability import niche_evolvability
-from nichechain.evolvability.coverage import check_lengths
+from nichechain.evolvability.niches import answer_for_niches
+from nichechain.evolvability.question import Question
 from nichechain.execution import Executor
 
 Float32s = NDArray[np.float32]
@@ -75,7 +75,7 @@ def sample_roots(
     filled: Ints,
     size: int,
     *,
-    l: int,  # noqa: E741
+    l: int,
     lineages: int,
     min_births: int = MIN_BIRTHS,
     seed: int = 0,
@@ -113,7 +113,7 @@ def sample_roots(
         raise NichechainError(
             f"{niches.size} niches have {min_births} births behind their row of T, but at least 3 are needed"
         )
-    scores = niche_evolvability(chain, l=l, lineages=lineages, draws=10, seed=seed).value
+    scores = answer_for_niches(chain, Question(l, lineages, draws=10, seed=seed)).value
     ranked = niches[np.argsort(scores[niches], kind="stable")]
     rng = keyed(seed, Purpose.CHECKED)
     groups = np.array_split(ranked, min(size, ranked.size))
@@ -125,7 +125,7 @@ def run_lineages(
     roots: Ints,
     executor: Executor,
     *,
-    l: int,  # noqa: E741
+    l: int,
     lineages: int,
     offspring: int = OFFSPRING,
     seed: int = 0,
@@ -158,10 +158,7 @@ def run_lineages(
     NichechainError
         If a number is out of range or a niche is empty.
     """
-    check_lengths(l, lineages)
-    check_whole(offspring=offspring)
-    if offspring < 1:
-        raise NichechainError(f"offspring is {offspring}, but at least 1 is needed")
+    check_at_least(1, l=l, lineages=lineages, offspring=offspring)
     elites = [archive.elite(int(root)).genotype for root in roots]
     mutate, niches = archive.mutate, archive.niches
 

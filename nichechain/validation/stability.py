@@ -13,10 +13,11 @@ from scipy.stats import spearmanr
 
 from nichechain.chain.counts import TransitionCounts
 from nichechain.chain.estimators import Estimator, estimate
-from nichechain.core.checks import as_floats, check_seed, check_whole
+from nichechain.core.checks import as_floats, check_at_least
 from nichechain.core.errors import NichechainError
 from nichechain.core.randomness import Purpose, keyed
-from nichechain.evolvability import niche_evolvability
+from nichechain.evolvability.niches import answer_for_niches
+from nichechain.evolvability.question import Question
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -60,7 +61,7 @@ class RankStability:
     all_births: int
     thin: str
     min_births: int
-    l: int  # noqa: E741  # the paper's name
+    l: int
     lineages: int
     estimator: str
 
@@ -116,7 +117,7 @@ def rank_stability(
     thin: Thin = "elite",
     repeats: int = 3,
     min_births: int = 20,
-    l: int = 5,  # noqa: E741
+    l: int = 5,
     lineages: int = 100,
     estimator: Estimator = "empirical-bayes",
     draws: int = 20,
@@ -162,12 +163,9 @@ def rank_stability(
         raise NichechainError(f"fractions are {tuple(parts.tolist())}, but must be between 0 and 1")
     if thin not in get_args(Thin):
         raise NichechainError(f"thin is {thin!r}, but must be one of {', '.join(get_args(Thin))}")
-    check_whole(repeats=repeats, min_births=min_births)
-    check_seed(seed)
-    if min_births < 0:
-        raise NichechainError(f"min_births is {min_births}, but must not be negative")
-    if repeats < 1:
-        raise NichechainError(f"repeats is {repeats}, but at least 1 is needed")
+    question = Question(l, lineages, draws=draws, seed=seed)
+    check_at_least(1, repeats=repeats)
+    check_at_least(0, min_births=min_births)
     ranked = np.flatnonzero(counts.births[: len(counts.niches)] >= min_births)
     if ranked.size < _FEWEST_NICHES:
         raise NichechainError(
@@ -178,8 +176,7 @@ def rank_stability(
     def scores(some: TransitionCounts, number: int) -> Floats:
         chain = estimate(some, estimator)
         # Draws of their own, so that rankings do not agree for having been drawn alike.
-        found = niche_evolvability(chain, l=l, lineages=lineages, draws=draws, seed=seed + number)
-        return found.value[ranked]
+        return answer_for_niches(chain, replace(question, seed=seed + number)).value[ranked]
 
     full = scores(counts, 0)
     spearman, births = np.empty((parts.size, repeats)), np.empty((parts.size, repeats))

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Literal, Protocol, get_args
+from typing import Any, Protocol, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
-from nichechain.core.checks import check_numbers
+from nichechain.core.checks import StepBound, check_numbers
 from nichechain.core.errors import NichechainError
 from nichechain.variation.noise import IndependentNoise, Noise, truncated
 
@@ -16,7 +16,6 @@ Floats = NDArray[np.float64]
 # Of floats of any precision: that of float32 in a search, of others in a test.
 Genotype = NDArray[Any]
 
-StepBound = Literal["per-coordinate", "rescaled"]
 BOUND_KINDS: tuple[str, ...] = get_args(StepBound)
 # Shortens a step a little below the bound, so that rounding does not bring it back to it.
 _BELOW = 1.0 - 1e-12

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import cast
 
+from nichechain.core.checks import StepBound
 from nichechain.core.errors import NichechainError
-from nichechain.variation.additive import Bound, StepBound
+from nichechain.variation.additive import Bound
 
 
 def parse_step_bound(text: str, name: str = "step_bound") -> tuple[StepBound, float]:

@@ -17,7 +17,7 @@ import nichechain
 from nichechain.archive.archive import Archive, load
 from nichechain.core.errors import ArchiveError
 
-ARCHIVE = Path(__file__).parent / "data" / "format-1"
+ARCHIVE = Path(__file__).parents[1] / "data" / "format-1"
 SLOWEST = 30.0
 """Seconds that reading may take on a machine that has much else to do."""
 

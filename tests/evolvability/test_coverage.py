@@ -293,7 +293,7 @@ def test_rarefaction_refuses(size):
 
 @pytest.mark.parametrize(
     ("generations", "lineages", "message"),
-    [(0, 1, "l is 0"), (-3, 1, "l is -3"), (1, 0, "lineages is 0"), (1, [5, 0], "lineages is 0")],
+    [(0, 1, "steps is 0"), (-3, 1, "steps is -3"), (1, 0, "lineages is 0"), (1, [5, 0], "lineages is 0")],
 )
 def test_lengths_are_refused(generations, lineages, message):
     with pytest.raises(NichechainError, match=message):

@@ -48,7 +48,7 @@ GOLDENS = [
 @pytest.mark.parametrize(
     "matrix", [T, sparse.csr_array(T), T.astype(np.float32)], ids=["dense", "sparse", "float32"]
 )
-def test_goldens(matrix, convention, l, lineages, golden):  # noqa: E741
+def test_goldens(matrix, convention, l, lineages, golden):
     chain = NicheChain(matrix)
     options = {"l": l, "lineages": lineages, "convention": convention}
     result = l_evolvability(chain, niche=0, **options)
@@ -63,7 +63,7 @@ def test_goldens(matrix, convention, l, lineages, golden):  # noqa: E741
 
 
 @pytest.mark.parametrize(("convention", "l", "lineages", "golden"), GOLDENS)
-def test_goldens_by_monte_carlo(convention, l, lineages, golden):  # noqa: E741
+def test_goldens_by_monte_carlo(convention, l, lineages, golden):
     chain = NicheChain(T)
     options = {
         "l": l,
@@ -112,7 +112,7 @@ def test_equals_enumeration_of_all_paths(n, outside):
     transition = rng.dirichlet(np.full(states, 0.6), states)
     chain = NicheChain(transition, outside=n if outside else None)
     given_d = rng.dirichlet(np.ones(states))
-    for l, lineages in itertools.product((1, 2, 3), (1, 2)):  # noqa: E741
+    for l, lineages in itertools.product((1, 2, 3), (1, 2)):
         options = {"l": l, "lineages": lineages}
         standing, drawn = [(1.0, 0, False)], [(p, j, True) for j, p in enumerate(given_d)]
         # The root stands in niche 0; l transitions; itself counted only by the procedure.
@@ -158,7 +158,7 @@ def test_the_papers_two_genotypes_with_equal_children():
 
 @given(seed=st.integers(0, 2**20), n=st.integers(1, 6), l=st.integers(1, 5), lineages=st.integers(1, 30))
 @settings(deadline=None, max_examples=40)
-def test_laws(seed, n, l, lineages):  # noqa: E741
+def test_laws(seed, n, l, lineages):
     rng = np.random.default_rng(seed)
     transition = rng.dirichlet(np.full(n + 1, 0.4), n + 1)
     chain = NicheChain(transition, outside=n)
@@ -193,10 +193,10 @@ def test_a_distribution_over_niches_alone_leaves_nothing_outside():
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"l": 0}, "l is 0, but a lineage has at least 1 generation"),
+        ({"l": 0}, "l is 0, but must be at least 1"),
         ({"l": -2}, "l is -2"),
         ({"l": 1.5}, "l is 1.5"),
-        ({"lineages": 0}, "lineages is 0, but at least 1 is needed"),
+        ({"lineages": 0}, "lineages is 0, but must be at least 1"),
         ({"lineages": -1}, "lineages is -1"),
         ({"lineages": 2.5}, "lineages is 2.5"),
         ({"method": "exactly"}, "method is 'exactly', but must be one of exact, monte-carlo"),
@@ -477,7 +477,10 @@ def test_a_genotype_by_monte_carlo_agrees_with_exact(plane_chain):
         ({"offspring": 0}, "offspring is 0"),
         ({"l": 0}, "l is 0"),
         ({"lineages": 0}, "lineages is 0"),
-        ({"first_generation": "guess"}, "first_generation is 'guess', but must be posterior or empirical"),
+        (
+            {"first_generation": "guess"},
+            "first_generation is 'guess', but must be one of posterior, empirical",
+        ),
         ({"method": "fast"}, "method is 'fast'"),
     ],
 )

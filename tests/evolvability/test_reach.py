@@ -90,7 +90,7 @@ def test_returns_of_tiny_probabilities():
         ("procedure", 2, 10, 2.943685532),
     ],
 )
-def test_goldens(convention, l, lineages, value):  # noqa: E741
+def test_goldens(convention, l, lineages, value):
     found = reach(NicheChain(GOLDEN), niche=0, l=l, lineages=lineages, convention=convention)
     assert found.evolvability == pytest.approx(value, abs=1e-9)
 
@@ -110,7 +110,7 @@ def test_by_hand():
 
 @given(transitions(), st.integers(1, 7), st.integers(1, 50), st.sampled_from(["definition", "procedure"]))
 @settings(max_examples=60, deadline=None)
-def test_sums_to_l_evolvability(transition, l, lineages, convention):  # noqa: E741
+def test_sums_to_l_evolvability(transition, l, lineages, convention):
     outside = len(transition) - 1 if len(transition) > 1 else None
     chain = NicheChain(transition, outside=outside)
     options = {"l": l, "lineages": lineages, "convention": convention}
@@ -155,7 +155,7 @@ def test_many_states_equal_the_recursion_over_all():
     i = np.repeat(np.arange(size), 6)
     weight = sparse.csr_array((rng.random(i.size), (i, rng.integers(size, size=i.size))), shape=(size, size))
     chain = NicheChain(sparse.csr_array(sparse.diags_array(1 / weight.sum(axis=1)) @ weight))
-    for l in (1, 2, 3, 6, 11):  # noqa: E741
+    for l in (1, 2, 3, 6, 11):
         value = l_evolvability(chain, niche=9, l=l).value
         assert reach(chain, niche=9, l=l).evolvability == pytest.approx(value, rel=1e-12)
 

@@ -14,7 +14,7 @@ from nichechain.evolvability.where_to_sample import evolvability_derivative, whe
 CONVENTIONS = ["definition", "procedure"]
 
 
-def _value(transition, niche, l, lineages, convention, counted):  # noqa: E741
+def _value(transition, niche, l, lineages, convention, counted):
     literal = convention == "procedure"
     first = np.eye(len(transition)) if literal else transition
     covered = expected_coverage(transition, first, l + literal, lineages, counted=counted)[:counted]
@@ -25,7 +25,7 @@ def _value(transition, niche, l, lineages, convention, counted):  # noqa: E741
 @pytest.mark.parametrize("convention", CONVENTIONS)
 @pytest.mark.parametrize("niche", [None, 2])
 @pytest.mark.parametrize(("l", "lineages"), [(1, 1), (1, 5), (2, 3), (4, 7)])
-def test_derivative_equals_finite_differences(form, convention, niche, l, lineages, monkeypatch):  # noqa: E741
+def test_derivative_equals_finite_differences(form, convention, niche, l, lineages, monkeypatch):
     # Blocks smaller than the chain, so that all of them count.
     monkeypatch.setattr(sampling, "_COLUMNS", 2)
     rng = np.random.default_rng(l)

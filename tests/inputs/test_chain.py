@@ -222,9 +222,9 @@ CALLS = (
     ),
     Call(
         "evolvability.coverage.expected_coverage",
-        lambda w: {"transition": w.given.T, "first": w.given.T, "generations": 2, "lineages": 3},
+        lambda w: {"transition": w.given.T, "first": w.given.T, "steps": 2, "lineages": 3},
         {
-            "generations": whole(0),
+            "steps": whole(0),
             "lineages": (*whole(0), [], [0, 1]),
             "counted": (-1, 4, *whole(0)[2:]),
             "columns": whole(0),
@@ -236,13 +236,13 @@ CALLS = (
             lambda w: {
                 "transition": w.given.T,
                 "roots": [0, 1],
-                "generations": 2,
+                "longest": 2,
                 "lineages": [3],
                 "counted": 3,
             },
             {
                 "roots": ([3], [-1], [0.5], "three"),
-                "generations": whole(0),
+                "longest": whole(0),
                 "lineages": ([], [0, 1], [0.5], "three"),
                 "counted": (-1, 4, *whole(0)[2:]),
             },
@@ -254,12 +254,12 @@ CALLS = (
         lambda w: {
             "transition": w.given.T,
             "first": np.array([1.0, 0.0, 0.0]),
-            "generations": 2,
+            "steps": 2,
             "lineages": 3,
             "repeats": 2,
             "rng": w.rng,
         },
-        {"generations": whole(0), "lineages": whole(0), "repeats": whole(0), "counted": (-1, 4, 1.5)},
+        {"steps": whole(0), "lineages": whole(0), "repeats": whole(0), "counted": (-1, 4, 1.5)},
     ),
     Call(
         "evolvability.coverage.rarefied_coverage",

@@ -103,7 +103,7 @@ CALLS = (
     ),
     Call(
         "niches.parse_niche",
-        lambda w: {"text": "1,2", "option": "--niche"},
+        lambda w: {"text": "1,2"},
         {"text": ("", "a", "1;2", "0.5")},
     ),
     Call("niches.parse_niches", lambda w: {"text": "cvt:4"}, {"text": ("", "4", "cvt:0", "cvt:x", "grid:4")}),

@@ -179,7 +179,6 @@ RESULTS = {
 }
 
 _TEXT = "a text for people, which may be anything"
-_CHECKED = "a check itself: its callers are in the tables"
 _WITHIN = "called by this package with what it has checked"
 _LATER = "opened or made when it is needed, where a command's table tries it"
 
@@ -198,13 +197,12 @@ EXEMPT: dict[tuple[str, str], str] = {
         ("plots.walks.plot_runs", "unit", _TEXT),
         ("plots.walks.plot_walks", "unit", _TEXT),
         ("pyribs.conversion.from_ribs", "objective_name", _TEXT),
-        ("evolvability.coverage.check_lengths", "generations lineages", _CHECKED),
-        ("evolvability.reach.check_draws", "convention draws", _CHECKED),
         ("births.table.check_columns", "births names", _WITHIN),
         ("births.table.schema", "axes", _WITHIN),
         ("births.table.table", "offspring child_niche accepted step run", _WITHIN),
         ("validation.held_out.probability_of", "parent child", _WITHIN),
-        ("evolvability.coverage.visit_probabilities", "generations counted columns", _WITHIN),
+        ("evolvability.coverage.visit_probabilities", "steps counted columns", _WITHIN),
+        ("evolvability.coverage.at_least_once", "probability trials", _WITHIN),
         ("evolvability.coverage.sampled_coverage", "first", _WITHIN),
         ("execution.base.evaluate_rows", "genotypes", _WITHIN),
         ("studies.running.run", "on_progress", _WITHIN),

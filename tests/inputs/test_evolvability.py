@@ -33,6 +33,7 @@ CALLS = (
         lambda w: {"chain": w.estimated, "offspring": [1.0, 0, 0, 0, 0, 0]},
         {"offspring": _SHARES, "niche": (0,)},
     ),
+    Call("evolvability.Question", lambda _: {}, _ASKED),
     Call("niche_evolvability", lambda w: {"chain": w.estimated}, _ASKED),
     Call(
         "genotype_evolvability",

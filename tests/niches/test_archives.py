@@ -210,6 +210,6 @@ def test_a_build_on_the_command_line(tmp_path, capsys):
     assert main([*asked, "--grid", "8x8", "--force"]) == 2
     assert "--grid 8x8 and --niches cvt:30 exclude each other" in capsys.readouterr().err
     assert main([*asked[:-1], "cvt:none", "--force"]) == 2
-    assert "--niches is 'cvt:none'" in capsys.readouterr().err
+    assert "niches is 'cvt:none'" in capsys.readouterr().err
     assert main(["explore", str(tmp_path / "a"), "--out", str(tmp_path / "page.html")]) == 2
     assert "tessellation, but the page shows a grid" in capsys.readouterr().err

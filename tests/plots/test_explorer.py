@@ -91,7 +91,7 @@ def test_intervals_are_those_of_the_library(archive, page):
     assert data["sizes"] == [10, 20, 1000]
     scores = numbers(data["scores"], np.float32).reshape(3, 3, 10, len(archive.niches))
     for u, lineages in enumerate(data["sizes"]):
-        for l in (1, 3, 10):  # noqa: E741
+        for l in (1, 3, 10):
             expected = nc.niche_evolvability(archive.chain(), l=l, lineages=lineages, draws=4, seed=1)
             found = scores[:, u, l - 1]
             np.testing.assert_allclose(found, [expected.value, expected.low, expected.high], rtol=1e-5)

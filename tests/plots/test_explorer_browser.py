@@ -143,7 +143,7 @@ def test_sliders_count_again(browser, archive):
     rectangle(browser, archive, (3, 4)).click()
     state = archive.niches.flat((3, 4))
     chain = archive.chain()
-    for l in (1, 9):  # noqa: E741
+    for l in (1, 9):
         slide(browser, "l", l)
         expected = expected_coverage(chain.T, chain.T[[state]], l, 50, counted=len(archive.niches))[0]
         assert text(browser, "plug-in") == f"{expected:.1f}"

@@ -66,10 +66,7 @@ def test_estimated_chain_has_a_band(ax):
     counts = nc.TransitionCounts.from_pairs(rng.integers(0, 16, 300), rng.integers(0, 16, 300), niches)
     chain = nc.estimate(counts)
     plot_generations(chain, ax, niches=[(1, 2)], lineages=10, longest=3, draws=6, seed=2)
-    values = [
-        nc.l_evolvability(chain, niche=(1, 2), l=l, lineages=10, draws=6, seed=2)
-        for l in (1, 2, 3)  # noqa: E741
-    ]
+    values = [nc.l_evolvability(chain, niche=(1, 2), l=l, lineages=10, draws=6, seed=2) for l in (1, 2, 3)]
     np.testing.assert_allclose(ax.lines[0].get_ydata(), [value.value for value in values])
     corners = ax.collections[0].get_paths()[0].vertices[:, 1]
     assert set(np.round(corners, 9)) == {round(v, 9) for value in values for v in (value.low, value.high)}
@@ -82,7 +79,7 @@ def test_estimated_chain_has_a_band(ax):
         ({"niches": [0, 1, 2, 3, 4]}, "5 niches are given"),
         ({"niches": [9]}, "niche is 9"),
         ({"niches": [0], "draws": 0}, "draws is 0"),
-        ({"niches": [0], "longest": 0}, "l is 0"),
+        ({"niches": [0], "longest": 0}, "longest is 0"),
         ({"niches": [0], "lineages": 0}, "lineages is 0"),
     ],
 )

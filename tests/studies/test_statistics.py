@@ -6,11 +6,11 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from nichechain.core.errors import NichechainError
+from nichechain.core.intervals import mean_interval
 from nichechain.studies.dissimila import study_dissimila
 from nichechain.studies.statistics import (
     adjust,
     change_test,
-    mean_interval,
     metric_test,
     paired_test,
     pressure_test,

@@ -131,7 +131,7 @@ def test_simulated_checks_have_the_mean_that_is_predicted(arm, lineages):
         assert (np.abs(mean - prediction.value) < 5 * error)[:, first:].all()
 
 
-def known_check(seed, roots=150, lineages=15, l=4):  # noqa: E741
+def known_check(seed, roots=150, lineages=15, l=4):
     """Lineages of a known chain, and what it predicts of them."""
     rng = np.random.default_rng(seed)
     niches = nc.GridNiches((7, 7), ((0, 1), (0, 1)))

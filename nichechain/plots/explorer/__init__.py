@@ -22,10 +22,9 @@ from scipy import sparse
 from nichechain.chain.displacement import GridDisplacement
 from nichechain.chain.structure.graph import LONG_JUMP
 from nichechain.chain.structure.wormholes import wormholes
-from nichechain.core.checks import check_whole
 from nichechain.core.errors import NichechainError
-from nichechain.evolvability.coverage import check_lengths, coverage_by_generation
-from nichechain.evolvability.roots import transition_draws
+from nichechain.evolvability.coverage import coverage_by_generation
+from nichechain.evolvability.question import Question
 from nichechain.niches import GridNiches
 
 if TYPE_CHECKING:
@@ -135,7 +134,7 @@ def write_explorer(
     chain: NicheChain,
     out: Path,
     *,
-    l: int = 5,  # noqa: E741  # the paper's name
+    l: int = 5,
     lineages: int = 100,
     draws: int = 20,
     seed: int = 0,
@@ -176,20 +175,17 @@ def explorer_page(
     archive: Archive,
     chain: NicheChain,
     *,
-    l: int = 5,  # noqa: E741
+    l: int = 5,
     lineages: int = 100,
     draws: int = 20,
     seed: int = 0,
 ) -> str:
     """The page as text; see :func:`write_explorer`."""
-    check_lengths(l, lineages)
+    question = Question(l, lineages, draws=draws, seed=seed)
     if l > LONGEST:
         raise NichechainError(f"l is {l}, but the page goes up to {LONGEST} generations")
     if lineages > _MOST_LINEAGES:
         raise NichechainError(f"lineages is {lineages}, but the page goes up to {_MOST_LINEAGES}")
-    check_whole(draws=draws)
-    if draws < 1:
-        raise NichechainError(f"draws is {draws}, but at least 1 is needed")
     axes = len(archive.meta.facts.behavior_names)
     if axes != 2:
         raise NichechainError(f"behavior has {axes} axes, but the page is a map over 2")
@@ -204,7 +200,7 @@ def explorer_page(
         **_elites(archive),
         **_transition(chain),
         **_observed(archive, chain),
-        **_intervals(chain, l, lineages, draws, seed),
+        **_intervals(chain, question),
     }
     style, program = _text("page.css"), "\n".join(map(_text, _PROGRAM))
     # Within an element, only the sign that could end it has to be written differently.
@@ -290,18 +286,18 @@ def _observed(archive: Archive, chain: NicheChain) -> dict[str, Any]:
     return found
 
 
-def _intervals(chain: NicheChain, l: int, lineages: int, draws: int, seed: int) -> dict[str, Any]:  # noqa: E741
+def _intervals(chain: NicheChain, question: Question) -> dict[str, Any]:
     """Mean, 5 % and 95 % quantile over the draws: (3, U, l, niches)."""
-    sizes = sorted({*_LINEAGES, lineages})
+    sizes = sorted({*_LINEAGES, question.lineages})
     roots = np.arange(chain.n_niches)
     drawn = [
         coverage_by_generation(matrix, roots, LONGEST, sizes, chain.n_niches).astype(np.float32)
-        for matrix in transition_draws(chain, draws, seed)
+        for matrix in question.transitions(chain)
     ]
     summary = np.stack([np.mean(drawn, axis=0), *np.quantile(drawn, (0.05, 0.95), axis=0)])
     return {
-        "l": l,
-        "lineages": lineages,
+        "l": question.l,
+        "lineages": question.lineages,
         "draws": len(drawn) if chain.posterior is not None else 0,
         "sizes": sizes,
         "scores": _packed(summary.transpose(0, 3, 2, 1), np.float32),

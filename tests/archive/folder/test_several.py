@@ -92,7 +92,7 @@ READER = """
 import sys
 from pathlib import Path
 import numpy as np
-from nichechain.archive import filling as building, write
+from nichechain.archive import filling as building, read, write
 from nichechain.archive.archive import load
 
 folder, total = Path(sys.argv[1]), int(sys.argv[2])

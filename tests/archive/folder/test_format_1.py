@@ -15,7 +15,7 @@ from nichechain.archive.build import build
 from nichechain.execution import Threads
 from nichechain.search.config import BuildConfig
 
-ARCHIVE = Path(__file__).parents[1] / "data" / "format-1"
+ARCHIVE = Path(__file__).parents[2] / "data" / "format-1"
 
 
 def test_its_numbers_are_those_of_then() -> None:

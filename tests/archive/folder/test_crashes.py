@@ -24,7 +24,7 @@ import os, random, signal, sys, time
 from pathlib import Path
 import ribs.archives
 import pyarrow.parquet
-from nichechain.archive import filling as building, write
+from nichechain.archive import filling as building, read, write
 from nichechain.search.config import BuildConfig
 from nichechain.execution import Threads
 from nichechain.core.randomness import Purpose

@@ -188,7 +188,7 @@ def test_half_a_file_is_not_left_on_a_full_disk(pristine: dict[str, bytes], tmp_
 SMALL_DISK = """
 import shutil, subprocess, sys
 from pathlib import Path
-from nichechain.archive import write
+from nichechain.archive import read, write
 from nichechain.archive.build import build
 from nichechain.search.config import BuildConfig
 from nichechain.core.errors import ArchiveError

@@ -1,0 +1,165 @@
+"""What is asked of a chain: how long and how many lineages, from which root, on which draws of T."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from nichechain.chain.model import NicheChain, Transition
+from nichechain.core.checks import as_floats, check_at_least, check_choice, check_seed
+from nichechain.core.errors import NichechainError
+from nichechain.core.randomness import Purpose, keyed
+from nichechain.niches import Niche
+
+Floats = NDArray[np.float64]
+Method = Literal["exact", "monte-carlo"]
+Convention = Literal["definition", "procedure"]
+
+DRAWS = 50
+"""Posterior draws of T that a value is averaged over."""
+
+
+@dataclass(frozen=True)
+class Question:
+    """What is asked about lineages without selection, whatever their root.
+
+    Parameters
+    ----------
+    l : int
+        Generations, at least 1.
+    lineages : int
+        Number U of independent lineages, at least 1: l·U descendants.
+    convention : {"definition", "procedure"}
+        Whether the root's own state counts, see :mod:`nichechain.evolvability`.
+    method : {"exact", "monte-carlo"}
+        Closed form, or the paper's simulation.
+    repeats : int
+        Simulations over all draws, at least 1.
+    draws : int
+        Posterior draws of T, where it is estimated, at least 1.
+    seed : int
+        Of draws and simulations.
+
+    Raises
+    ------
+    NichechainError
+        If a number is out of range or a name unknown.
+    """
+
+    l: int = 5
+    lineages: int = 100
+    convention: Convention = "definition"
+    method: Method = "exact"
+    repeats: int = 100
+    draws: int = DRAWS
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        check_at_least(1, l=self.l, lineages=self.lineages, repeats=self.repeats, draws=self.draws)
+        check_choice("convention", self.convention, get_args(Convention))
+        check_choice("method", self.method, get_args(Method))
+        check_seed(self.seed)
+
+    @property
+    def root_counts(self) -> bool:
+        """Whether the root's own state is one of those that are counted."""
+        return self.convention == "procedure"
+
+    @property
+    def steps(self) -> int:
+        """States of a lineage that count: l, and the root's own where it does."""
+        return self.l + self.root_counts
+
+    def transitions(self, chain: NicheChain, *, redraw: bool = False) -> Iterator[Transition]:
+        """T itself where it is given, draws from its posterior where it is estimated with one.
+
+        Parameters
+        ----------
+        chain : NicheChain
+        redraw : bool
+            Whether a T that is given comes as often as one that is drawn, since something else is
+            drawn with it.
+
+        Yields
+        ------
+        (S, S) array, scipy.sparse.csr_array or PooledTransition
+            Draw k comes from ``keyed(seed, Purpose.POSTERIOR, k)``.
+        """
+        for number in range(self._samples(chain, redraw)):
+            if chain.posterior is None:
+                yield chain.operator
+            else:
+                yield chain.posterior.draw(keyed(self.seed, Purpose.POSTERIOR, number))
+
+    def repeats_of_each(self, chain: NicheChain, *, redraw: bool = False) -> int:
+        """Simulations on each of :meth:`transitions`, so that all have as many as asked for."""
+        return math.ceil(self.repeats / self._samples(chain, redraw))
+
+    def _samples(self, chain: NicheChain, redraw: bool) -> int:
+        return self.draws if redraw or chain.posterior is not None else 1
+
+
+class Root:
+    """Where lineages begin: in a niche, or with offspring of a given distribution.
+
+    Parameters
+    ----------
+    chain : NicheChain
+    niche : int or tuple of int, optional
+        The root stands in this niche.
+    offspring : (n_niches,) or (S,) array, optional
+        D: generation 1 is drawn from this distribution. Give either this or ``niche``.
+
+    Raises
+    ------
+    NichechainError
+        If not exactly one is given, there is no such niche, or D is no distribution.
+    """
+
+    def __init__(
+        self, chain: NicheChain, *, niche: Niche | None = None, offspring: ArrayLike | None = None
+    ) -> None:
+        if (niche is None) == (offspring is None):
+            raise NichechainError("give either a niche or the distribution of the offspring, and only one")
+        self.state = None if niche is None else chain.state(niche)
+        known = self.state is not None and chain.births is not None
+        self.births: int | None = int(chain.births[self.state]) if known else None  # type: ignore[index]
+        self._distribution = np.zeros(chain.states)
+        if offspring is not None:
+            self._distribution = _distribution(offspring, chain)
+        else:
+            self._distribution[self.state] = 1.0
+
+    def first(self, transition: Transition, question: Question) -> Floats:
+        """Distribution of the first state that counts, (S,): the root's own, or its child's."""
+        return self._distribution if question.root_counts else self.children(transition)
+
+    def children(self, transition: Transition) -> Floats:
+        """Distribution of generation 1, (S,)."""
+        if self.state is None:
+            return self._distribution
+        if isinstance(transition, np.ndarray):
+            row: Floats = transition[self.state]
+        else:
+            row = transition[[self.state]].toarray()[0]
+        return row
+
+
+def _distribution(offspring: ArrayLike, chain: NicheChain) -> Floats:
+    given = as_floats("offspring", offspring)
+    if given.shape not in ((chain.n_niches,), (chain.states,)):
+        raise NichechainError(
+            f"offspring has shape {given.shape}, but must be ({chain.n_niches},), one share per niche"
+        )
+    if not np.isfinite(given).all() or (given < 0).any() or abs(given.sum() - 1.0) > 1e-8:
+        raise NichechainError(
+            f"offspring sums to {given.sum():.9g}, but must be shares that are not negative and sum to 1"
+        )
+    shares = np.zeros(chain.states)
+    shares[: given.size] = given
+    return shares
