@@ -93,7 +93,7 @@ def calibrate(
         config = replace(meta.config, selection="uniform")
         search = MapElites(domain, niches, mutate, config, state, stretch=last.stretch(config))
         writer = write.Writer(folder, meta.config, meta.facts, niches=niches, calibrations=calibrations)
-        filling = Filling(folder, search, writer, failures, 0, len(niches), on_progress)
+        filling = Filling(folder, search, writer, failures, 0, len(niches), on_progress, meta.births)
         with ExitStack() as stack:
             filling.go(last.end, executor or stack.enter_context(Threads()))
 

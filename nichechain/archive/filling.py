@@ -54,6 +54,8 @@ class Filling:
     state : int
         The number of the outside state.
     on_progress : callable, optional
+    kept : int
+        Births that the folder holds: it stays as it is until there are more.
     """
 
     folder: Path
@@ -63,6 +65,7 @@ class Filling:
     outside: int
     state: int
     on_progress: Callable[[Progress], None] | None
+    kept: int = 0
     _under_way: int = 0
 
     def go(self, births: int, executor: Executor, on_step: Callable[[pa.Table], None] | None = None) -> None:
@@ -110,7 +113,7 @@ class Filling:
         finally:
             # An interrupt between two halves of a step leaves nothing to commit; the last commit
             # is at most half a minute old.
-            if self.search.settled and self.search.births == self.writer.births > 0:
+            if self.search.settled and self.search.births == self.writer.births > self.kept:
                 self.writer.commit(self.search.state)
 
     def _tell(self, done: int = 0) -> None:
