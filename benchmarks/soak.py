@@ -21,7 +21,7 @@ from pathlib import Path
 import numpy as np
 
 from nichechain.archive import read, write
-from nichechain.archive.build import Progress, build
+from nichechain.archive.build import BuildProgress, build
 from nichechain.domains import PlanarArm
 from nichechain.execution import Threads
 from nichechain.niches import parse_shape
@@ -46,7 +46,7 @@ class Meter:
 
         write.Writer.commit = timed  # type: ignore[method-assign]
 
-    def __call__(self, progress: Progress) -> None:
+    def __call__(self, progress: BuildProgress) -> None:
         """Take the time whenever a tenth is done."""
         if progress.births >= len(self.marks) * self.births / 10:
             self.marks.append((progress.births, time.process_time(), time.perf_counter(), *memory()))

@@ -16,7 +16,7 @@ from ray.cluster_utils import Cluster
 
 import nichechain as nc
 from nichechain import domains, execution
-from nichechain.archive.build import Progress
+from nichechain.archive.build import BuildProgress
 
 domain = domains.make("fetch")
 config = nc.BuildConfig("fetch", (20, 20), domain.bounds, evaluations=400, seed=0)
@@ -32,7 +32,7 @@ ray.init(address=cluster.address, logging_level="ERROR", log_to_driver=False)
 lost = False
 
 
-def watch(progress: Progress) -> None:
+def watch(progress: BuildProgress) -> None:
     """Report, and take the second node away at half the budget."""
     global lost
     print(f"\r{progress.births} births, {progress.filled} niches filled", end="", flush=True)

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from nichechain.cli.build import Build
+from nichechain.cli.build import BuildCommand
 from nichechain.cli.console import parse
 from nichechain.search.making import make_domain
 
@@ -72,6 +72,6 @@ def test_the_commands_ask_for_builds():
     assert len(commands) == 3
     for words in commands:
         assert words[:2] == ["nichechain", "build"]
-        config = parse(Build, words[2:]).config()
+        config = parse(BuildCommand, words[2:]).config()
         assert config.domain_options
         assert repr(make_domain(config))

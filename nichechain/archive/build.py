@@ -9,11 +9,12 @@ from pathlib import Path
 import pyarrow as pa
 
 from nichechain.archive import read, write
-from nichechain.archive.filling import Filling, Progress, count
+from nichechain.archive.filling import BuildProgress, Filling, count
 from nichechain.core.errors import ArchiveError
-from nichechain.core.locking import writing
+from nichechain.core.files import writing
 from nichechain.domains.base import Domain
 from nichechain.execution import Executor
+from nichechain.search import savings
 from nichechain.search.config import MOST_FAILED, BuildConfig
 from nichechain.search.failures import Failures, check_first_batch
 from nichechain.search.making import make_domain, make_mutation, make_niches
@@ -27,7 +28,7 @@ def build(
     executor: Executor,
     *,
     domain: Domain | None = None,
-    on_progress: Callable[[Progress], None] | None = None,
+    on_progress: Callable[[BuildProgress], None] | None = None,
     max_failed: float = MOST_FAILED,
 ) -> None:
     """Fill an archive folder, going on from what it holds.
@@ -89,6 +90,7 @@ def build(
         else:
             niches = make_niches(config)
         search = MapElites(domain, niches, mutate, config, state, scores)
+        search.savings = savings.read(folder) if state is not None else search.savings
         writer = write.Writer(folder, config, read.DomainFacts.of(domain), niches=niches)
 
         def check_first(rows: pa.Table) -> None:

@@ -23,11 +23,12 @@ from pathlib import Path
 
 from nichechain.archive import read, write
 from nichechain.archive.archive import Archive
-from nichechain.archive.filling import Filling, Progress
-from nichechain.core.checks import check_whole
+from nichechain.archive.filling import BuildProgress, Filling
+from nichechain.core.checks import check_at_least
 from nichechain.core.errors import ArchiveError, NichechainError
-from nichechain.core.locking import writing
+from nichechain.core.files import writing
 from nichechain.execution import Executor, Threads
+from nichechain.search import savings
 from nichechain.search.config import MOST_FAILED
 from nichechain.search.elites import SearchState
 from nichechain.search.failures import Failures
@@ -41,7 +42,7 @@ def calibrate(
     executor: Executor | None = None,
     *,
     resume: bool = False,
-    on_progress: Callable[[Progress], None] | None = None,
+    on_progress: Callable[[BuildProgress], None] | None = None,
     max_failed: float = MOST_FAILED,
 ) -> None:
     """Add births of unselected lineages to a finished archive.
@@ -92,6 +93,7 @@ def calibrate(
         # Lineages begin at any elite alike, however the search drew its parents.
         config = replace(meta.config, selection="uniform")
         search = MapElites(domain, niches, mutate, config, state, stretch=last.stretch(config))
+        search.savings = savings.read(folder)
         writer = write.Writer(folder, meta.config, meta.facts, niches=niches, calibrations=calibrations)
         filling = Filling(folder, search, writer, failures, 0, len(niches), on_progress, meta.births)
         with ExitStack() as stack:
@@ -109,9 +111,7 @@ def _check_asked(rollouts: int | None, resume: bool) -> None:
         raise NichechainError(
             f"rollouts {rollouts} and resume exclude each other: what is resumed has its number of births"
         )
-    check_whole(rollouts=rollouts)
-    if rollouts < 1:
-        raise NichechainError(f"rollouts is {rollouts}, but must be at least 1")
+    check_at_least(1, rollouts=rollouts)
 
 
 def _check_can(meta: read.Meta, folder: Path) -> None:

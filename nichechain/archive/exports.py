@@ -8,7 +8,6 @@ from __future__ import annotations
 import csv
 import io
 import math
-import os
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,7 +15,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
-from nichechain.core.errors import NichechainError
+from nichechain.births.joins import across_runs, parent_rows
+from nichechain.births.table import NONE, check_columns
+from nichechain.core.files import replace_file
 from nichechain.niches import Niches
 
 if TYPE_CHECKING:
@@ -45,7 +46,7 @@ def write_graphml(graph: nx.DiGraph, path: str | Path) -> None:
 
     buffer = io.BytesIO()
     nx.write_graphml(_flat(graph), buffer, named_key_ids=True)
-    _replace(path, buffer.getvalue())
+    replace_file(path, buffer.getvalue())
 
 
 def write_gexf(graph: nx.DiGraph, path: str | Path) -> None:
@@ -63,7 +64,7 @@ def write_gexf(graph: nx.DiGraph, path: str | Path) -> None:
         edge["weight"] = edge["probability"]
     buffer = io.BytesIO()
     nx.write_gexf(flat, buffer)
-    _replace(path, buffer.getvalue())
+    replace_file(path, buffer.getvalue())
 
 
 def write_dot(graph: nx.DiGraph, path: str | Path) -> None:
@@ -82,7 +83,7 @@ def write_dot(graph: nx.DiGraph, path: str | Path) -> None:
     lines = ["digraph niches {"]
     lines += [f"  {node} {_dot_attributes(attributes)};" for node, attributes in flat.nodes(data=True)]
     lines += [f"  {i} -> {j} {_dot_attributes(edge)};" for i, j, edge in flat.edges(data=True)]
-    _replace(path, "\n".join([*lines, "}", ""]).encode())
+    replace_file(path, "\n".join([*lines, "}", ""]).encode())
 
 
 def write_edges(graph: nx.DiGraph, path: str | Path) -> None:
@@ -92,7 +93,7 @@ def write_edges(graph: nx.DiGraph, path: str | Path) -> None:
     """
     edges = [{"source": i, "target": j, **edge} for i, j, edge in graph.edges(data=True)]
     names = ["source", "target", "probability", "count", "distance", "long_jump"]
-    _replace(path, _csv(names, ([edge.get(name, "") for name in names] for edge in edges)))
+    replace_file(path, _csv(names, ([edge.get(name, "") for name in names] for edge in edges)))
 
 
 def write_stn(births: pd.DataFrame, niches: Niches, path: str | Path) -> None:
@@ -122,7 +123,7 @@ def write_stn(births: pd.DataFrame, niches: Niches, path: str | Path) -> None:
     largest objective that was ever born there; tell them to maximise. Births without a parent, or
     without a niche because they failed, are no steps.
     """
-    _demand(births, "run", "parent_niche", "child_niche", "objective")
+    check_columns(births, "run", "parent_niche", "child_niche", "objective")
     best = births.dropna(subset=["child_niche"]).groupby("child_niche")["objective"].max()
     fitness = {int(niche): float(value) for niche, value in best.items()}
     moved = births.dropna(subset=["parent_niche", "child_niche"])
@@ -141,7 +142,7 @@ def write_stn(births: pd.DataFrame, niches: Niches, path: str | Path) -> None:
     )
     separator = "," if Path(path).suffix.lower() == ".csv" else " "
     names = ["Run", "Fitness1", "Solution1", "Fitness2", "Solution2"]
-    _replace(path, _csv(names, rows, separator))
+    replace_file(path, _csv(names, rows, separator))
 
 
 def write_phylogeny(births: pd.DataFrame, niches: Niches, path: str | Path) -> None:
@@ -167,7 +168,7 @@ def write_phylogeny(births: pd.DataFrame, niches: Niches, path: str | Path) -> N
     ``failed`` for none), ``run``, ``uid``, ``depth`` and ``objective``. Ids are uids, those of
     later runs being counted on from those of earlier ones.
     """
-    _demand(births, "run", "uid", "parent_uid", "step", "child_niche", "depth", "objective")
+    check_columns(births, "run", "uid", "parent_uid", "step", "child_niche", "depth", "objective")
     number, parents = _numbered(births)
     rows = (
         [
@@ -188,7 +189,7 @@ def write_phylogeny(births: pd.DataFrame, niches: Niches, path: str | Path) -> N
         )
     )
     names = ["id", "ancestor_list", "origin_time", "info", "run", "uid", "depth", "objective"]
-    _replace(path, _csv(names, rows))
+    replace_file(path, _csv(names, rows))
 
 
 def genealogy(births: pd.DataFrame) -> dict[int, tuple[int, ...]]:
@@ -211,7 +212,7 @@ def genealogy(births: pd.DataFrame) -> dict[int, tuple[int, ...]]:
     NichechainError
         If a column is missing or a parent is not among the births.
     """
-    _demand(births, "run", "uid", "parent_uid")
+    check_columns(births, "run", "uid", "parent_uid")
     number, parents = _numbered(births)
     return {
         own + 1: () if parent is None else (parent + 1,) for own, parent in zip(number, parents, strict=True)
@@ -227,7 +228,7 @@ def write_genealogy(births: pd.DataFrame, path: str | Path) -> None:
         If a column is missing, a parent is not among the births, or the file cannot be written.
     """
     pairs = ([child, *(parents or ("",))] for child, parents in genealogy(births).items())
-    _replace(path, _csv(["child", "parent"], pairs))
+    replace_file(path, _csv(["child", "parent"], pairs))
 
 
 def _flat(graph: nx.DiGraph) -> nx.DiGraph:
@@ -252,28 +253,13 @@ def _dot_value(value: Any) -> str:
 
 def _numbered(births: pd.DataFrame) -> tuple[list[int], list[int | None]]:
     """One number for each birth of all runs, and that of its parent."""
-    run = births["run"].to_numpy(np.int64)
-    uid = births["uid"].to_numpy(np.int64)
-    parent = births["parent_uid"].astype("Int64")
-    runs, which = np.unique(run, return_inverse=True)
-    sizes = [uid[which == k].max() + 1 for k in range(runs.size)]
-    offset = np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)[which]
-    number = (uid + offset).tolist()
-    parents = [
-        None if before is pd.NA else int(before) + int(shift)
-        for before, shift in zip(parent.tolist(), offset.tolist(), strict=True)
-    ]
-    known = set(number)
-    for own, before in zip(number, parents, strict=True):
-        if before is not None and before not in known:
-            raise NichechainError(f"birth {own} has parent {before}, but there is no such birth")
-    return number, parents
-
-
-def _demand(births: pd.DataFrame, *names: str) -> None:
-    missing = [name for name in names if name not in births]
-    if missing:
-        raise NichechainError(f"births have no column {missing[0]}, but need {', '.join(names)}")
+    run, uid, parent_uid = (
+        births[name].fillna(NONE).to_numpy(np.int64) for name in ("run", "uid", "parent_uid")
+    )
+    # Refuses a parent that is not there.
+    parent_rows(run, uid, parent_uid)
+    number, parents = across_runs(run, uid, parent_uid)
+    return number.tolist(), [None if parent == NONE else parent for parent in parents.tolist()]
 
 
 def _csv(names: Sequence[str], rows: Iterable[Sequence[Any]], separator: str = ",") -> bytes:
@@ -282,19 +268,3 @@ def _csv(names: Sequence[str], rows: Iterable[Sequence[Any]], separator: str = "
     writer.writerow(names)
     writer.writerows(rows)
     return text.getvalue().encode()
-
-
-def _replace(path: str | Path, content: bytes) -> None:
-    """Put a file in place in one step."""
-    target = Path(path)
-    part = target.with_name(f".{target.name}.{os.getpid()}.tmp")
-    try:
-        with part.open("wb") as file:
-            file.write(content)
-            file.flush()
-            os.fsync(file.fileno())
-        part.replace(target)
-    except OSError as error:
-        raise NichechainError(f"{target} cannot be written: {error.strerror}") from error
-    finally:
-        part.unlink(missing_ok=True)

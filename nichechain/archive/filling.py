@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,6 +13,7 @@ import pyarrow as pa
 
 from nichechain.archive.write import Writer
 from nichechain.execution import Executor
+from nichechain.search import savings
 from nichechain.search.failures import Failures
 from nichechain.search.map_elites import MapElites
 
@@ -20,7 +22,7 @@ _COMMIT_SHARE = 0.01
 
 
 @dataclass(frozen=True)
-class Progress:
+class BuildProgress:
     """How far a build or a calibration is.
 
     Parameters
@@ -64,7 +66,7 @@ class Filling:
     failures: Failures
     outside: int
     state: int
-    on_progress: Callable[[Progress], None] | None
+    on_progress: Callable[[BuildProgress], None] | None
     kept: int = 0
     _under_way: int = 0
 
@@ -94,7 +96,7 @@ class Filling:
         try:
             while self.search.births < births:
                 self.failures.check(
-                    f"{self.folder} keeps them, and --resume with a larger --max-failed goes on from there"
+                    f"{self.folder} keeps them, and a build with a larger max_failed goes on from there"
                 )
                 rows = self.search.advance(executor, births - self.search.births, self._tell)
                 self._under_way = 0
@@ -106,7 +108,7 @@ class Filling:
                 self._tell()
                 if time.monotonic() - last_commit > pause:
                     began = time.monotonic()
-                    self.writer.commit(self.search.state)
+                    self._commit()
                     last_commit = time.monotonic()
                     # Many large genotypes take a while to write.
                     pause = max(CHECKPOINT_SECONDS, (last_commit - began) / _COMMIT_SHARE)
@@ -114,13 +116,19 @@ class Filling:
             # An interrupt between two halves of a step leaves nothing to commit; the last commit
             # is at most half a minute old.
             if self.search.settled and self.search.births == self.writer.births > self.kept:
-                self.writer.commit(self.search.state)
+                self._commit()
+
+    def _commit(self) -> None:
+        self.writer.commit(self.search.state)
+        # Of no consequence where it cannot be written.
+        with suppress(OSError):
+            savings.write(self.folder, self.search.savings)
 
     def _tell(self, done: int = 0) -> None:
         self._under_way += done
         if self.on_progress is not None:
             births = self.search.births + self._under_way
-            self.on_progress(Progress(births, self.search.filled, self.outside, self.failures.failed))
+            self.on_progress(BuildProgress(births, self.search.filled, self.outside, self.failures.failed))
 
 
 def count(rows: pa.Table, state: int) -> int:

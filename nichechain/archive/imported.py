@@ -14,9 +14,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from nichechain import births
 from nichechain.archive import read, write
+from nichechain.births.joins import repeated
 from nichechain.births.table import NONE
 from nichechain.core.errors import ArchiveError, NichechainError
-from nichechain.core.locking import writing
+from nichechain.core.files import writing
 from nichechain.niches import Niches
 from nichechain.search.config import BuildConfig
 from nichechain.search.elites import Elites, SearchState
@@ -369,11 +370,10 @@ def _within_runs(run: Ints) -> Ints:
 
 
 def _check_unique(run: Ints, uid: Ints, name: str) -> None:
-    pairs, index = np.unique(np.stack([run, uid]), axis=1, return_index=True)
-    if pairs.shape[1] < run.size:
-        again = np.setdiff1d(np.arange(run.size), index)[0]
+    again = repeated(run, uid)
+    if again.any():
         raise NichechainError(
-            f"row {again + 1} has {name} {uid[again]} again, but births of a run differ in it"
+            f"row {_row(again)} has {name} {uid[again][0]} again, but births of a run differ in it"
         )
 
 

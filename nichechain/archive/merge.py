@@ -7,13 +7,12 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
 from nichechain.archive import read, write
 from nichechain.core.errors import ArchiveError, NichechainError
-from nichechain.core.locking import writing
+from nichechain.core.files import writing
 from nichechain.niches import Niches
 from nichechain.search.config import BuildConfig
 from nichechain.search.elites import Elites, SearchState
@@ -86,7 +85,8 @@ def merge(folders: Sequence[str | Path], out: str | Path) -> None:
         first_uid += meta.births
     births = pa.concat_tables(tables)
     config = replace(metas[0].config, evaluations=len(births))
-    state = SearchState.at_rest(_largest(elites), len(births), max(meta.step for meta in metas))
+    step = max(meta.step for meta in metas)
+    state = SearchState.at_rest(Elites.concatenate(elites).winners(), len(births), step)
     with writing(out):
         if read.is_archive(out):
             raise ArchiveError(f"{out} already holds an archive: merge into another folder")
@@ -156,13 +156,3 @@ def _renumbered(births: pa.Table, first_run: int, first_uid: int) -> pa.Table:
         moved = pc.add(births[name], pa.scalar(by, kind.type))
         births = births.set_column(births.schema.get_field_index(name), kind, moved)
     return births
-
-
-def _largest(elites: list[Elites]) -> Elites:
-    """Of every state, the elite with the largest key; of equal keys that with the smallest uid."""
-    pooled = elites[0]
-    for more in elites[1:]:
-        pooled = Elites.concatenate(pooled, more)
-    pooled = pooled[np.lexsort((pooled.uid, -pooled.key, pooled.niche))]
-    _, first = np.unique(pooled.niche, return_index=True)
-    return pooled[first]

@@ -11,7 +11,7 @@ import math
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -28,7 +28,7 @@ from nichechain.domains.base import Domain
 from nichechain.niches import Niches
 from nichechain.search.config import BuildConfig
 from nichechain.search.elites import Elites, SearchState
-from nichechain.search.lineages import Calibration, Lineages
+from nichechain.search.lineages import Calibration, UnderWay
 from nichechain.search.making import make_niches
 
 FORMAT = 1
@@ -324,19 +324,19 @@ def read_state(folder: Path, meta: Meta) -> SearchState:
     content = _read(folder, meta.elites)
     with _reading(folder / meta.elites["file"]):
         arrays = untrusted.read_arrays(content, _ARRAYS, _LINEAGE_ARRAYS)
-        elites = Elites(*(arrays[name] for name in Elites.__dataclass_fields__))
+        elites = Elites(*(arrays[field.name] for field in fields(Elites)))
         arrays.setdefault("pending_lineage", np.zeros(len(arrays["pending_uid"]), bool))
-        pending = Offspring(*(arrays[f"pending_{name}"] for name in Offspring.__dataclass_fields__))
-        lineages = Lineages.none(elites.genotype.shape[1])
+        pending = Offspring(*(arrays[f"pending_{field.name}"] for field in fields(Offspring)))
+        lineages = UnderWay.none(elites.genotype.shape[1])
         if "lineage_slot" in arrays:
-            lineages = Lineages(*(arrays[f"lineage_{name}"] for name in Lineages.__dataclass_fields__))
+            lineages = UnderWay(*(arrays[f"lineage_{field.name}"] for field in fields(UnderWay)))
         _check_state(elites, pending, lineages, meta)
     return SearchState(elites, pending, meta.births, meta.step, lineages)
 
 
-def _check_state(elites: Elites, pending: Offspring, lineages: Lineages, meta: Meta) -> None:
+def _check_state(elites: Elites, pending: Offspring, lineages: UnderWay, meta: Meta) -> None:
     for rows in (elites, pending, lineages):
-        if len({len(getattr(rows, name)) for name in rows.__dataclass_fields__}) != 1:
+        if len({len(column) for column in rows.columns().values()}) != 1:
             raise ValueError("its arrays differ in length")
     if elites.behavior.shape[1] != len(meta.config.bounds):
         raise ValueError(f"its behaviors have {elites.behavior.shape[1]} axes")

@@ -48,14 +48,15 @@ from nichechain.archive.read import (
     read_meta,
     read_part,
 )
-from nichechain.births.table import LINEAGE, Offspring
+from nichechain.births.table import LINEAGE
 from nichechain.core.errors import ArchiveError
 from nichechain.core.files import write_atomically
 from nichechain.core.machine import library_versions, machine
 from nichechain.niches import CVTNiches, Niches
+from nichechain.search import savings
 from nichechain.search.config import BuildConfig
-from nichechain.search.elites import Elites, SearchState
-from nichechain.search.lineages import Calibration, Lineages
+from nichechain.search.elites import SearchState
+from nichechain.search.lineages import Calibration
 
 PART_ROWS = 65_536
 
@@ -152,7 +153,7 @@ class Writer:
         except OSError as error:
             raise ArchiveError(
                 f"{error.filename or self._folder} cannot be written: {error.strerror or error}; "
-                f"the last commit, of {self._committed} births, is whole: --resume goes on from there"
+                f"the last commit, of {self._committed} births, is whole: another build goes on from there"
             ) from error
 
     def _write_full_parts(self) -> None:
@@ -169,9 +170,9 @@ class Writer:
     def _commit(self, state: SearchState) -> None:
         self._write_full_parts()
         parts = [*self._full, self._write_part(self._tail)] if len(self._tail) else self._full
-        arrays = {name: getattr(state.elites, name) for name in Elites.__dataclass_fields__}
-        arrays |= {f"pending_{name}": getattr(state.pending, name) for name in Offspring.__dataclass_fields__}
-        arrays |= {f"lineage_{name}": getattr(state.lineages, name) for name in Lineages.__dataclass_fields__}
+        arrays = state.elites.columns()
+        arrays |= {f"pending_{name}": column for name, column in state.pending.columns().items()}
+        arrays |= {f"lineage_{name}": column for name, column in state.lineages.columns().items()}
         if not (state.pending.lineage.any() or len(state.lineages)):
             # As archives were before there were lineages.
             arrays = {name: array for name, array in arrays.items() if LINEAGE not in name}
@@ -228,6 +229,7 @@ def clear(folder: Path) -> None:
     """Remove an archive's files from a folder, and nothing else."""
     (folder / META).unlink(missing_ok=True)
     (folder / f"{META}.tmp").unlink(missing_ok=True)
+    (folder / savings.FILE).unlink(missing_ok=True)
     for pattern in ("elites-*.npz*", f"{CENTROIDS}*", f"{BIRTHS}/part-*.parquet*"):
         for path in folder.glob(pattern):
             path.unlink()

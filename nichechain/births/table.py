@@ -28,13 +28,18 @@ lineage : bool
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
+from nichechain.core.columns import Columnar
 from nichechain.core.errors import NichechainError
 from nichechain.domains.base import Evaluation
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 LINEAGE = "lineage"
 """The column that parts may lack."""
@@ -44,7 +49,7 @@ NONE = -1
 
 
 @dataclass(frozen=True)
-class Offspring:
+class Offspring(Columnar):
     """Genotypes on their way to be evaluated, and where they come from.
 
     Parameters
@@ -67,15 +72,9 @@ class Offspring:
 
     @classmethod
     def none(cls, length: int) -> Offspring:
-        """Nobody, with genotypes of that length."""
+        """No offspring, of genotypes of that length."""
         none = np.empty(0, np.int64)
         return cls(np.empty((0, length), np.float32), none, none, none, none, np.empty(0, bool))
-
-    def __len__(self) -> int:
-        return len(self.uid)
-
-    def __getitem__(self, rows: slice) -> Offspring:
-        return Offspring(*(getattr(self, name)[rows] for name in self.__dataclass_fields__))
 
 
 def schema(axes: int) -> pa.Schema:
@@ -98,7 +97,7 @@ def schema(axes: int) -> pa.Schema:
     )
 
 
-def check_columns(births: pa.Table, *names: str) -> None:
+def check_columns(births: pa.Table | pd.DataFrame, *names: str) -> None:
     """Refuse a table that lacks some of these columns.
 
     Raises
@@ -106,12 +105,13 @@ def check_columns(births: pa.Table, *names: str) -> None:
     NichechainError
         If it does.
     """
-    missing = [name for name in names if name not in births.column_names]
+    there = births.column_names if isinstance(births, pa.Table) else births.columns
+    missing = [name for name in names if name not in there]
     if missing:
         raise NichechainError(f"births have no column {missing[0]}, but need {', '.join(names)}")
 
 
-def table(
+def make_table(
     offspring: Offspring,
     evaluation: Evaluation,
     *,

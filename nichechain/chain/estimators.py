@@ -14,7 +14,7 @@ from nichechain.chain.empirical_bayes import design_effect, most_likely
 from nichechain.chain.model import NicheChain, Transition
 from nichechain.chain.operator import PooledTransition
 from nichechain.chain.posterior import DirichletPosterior
-from nichechain.core.checks import check_numbers
+from nichechain.core.checks import check_choice, check_positive
 from nichechain.core.errors import NichechainError
 
 Floats = NDArray[np.float64]
@@ -62,8 +62,7 @@ def estimate(
     NichechainError
         If an argument is unknown or belongs to another estimator.
     """
-    if estimator not in ESTIMATORS:
-        raise NichechainError(f"estimator is {estimator!r}, but must be one of {', '.join(ESTIMATORS)}")
+    check_choice("estimator", estimator, ESTIMATORS)
     if estimator == "mle":
         if strength is not None:
             raise NichechainError("strength belongs to empirical-bayes and dirichlet, not to mle")
@@ -78,8 +77,7 @@ def estimate(
 
 
 def _mle(counts: TransitionCounts, unvisited: str) -> NicheChain:
-    if unvisited not in UNVISITED:
-        raise NichechainError(f"unvisited is {unvisited!r}, but must be one of {', '.join(UNVISITED)}")
+    check_choice("unvisited", unvisited, UNVISITED)
     states = counts.niches.states
     has_outside = states > len(counts.niches)
     if unvisited == "absorb" and not has_outside:
@@ -162,7 +160,5 @@ def with_posterior(counts: TransitionCounts, posterior: DirichletPosterior, name
 
 
 def _positive(strength: float) -> float:
-    check_numbers(strength=strength)
-    if not (np.isfinite(strength) and strength > 0):
-        raise NichechainError(f"strength is {strength}, but must be a positive number")
+    check_positive(strength=strength)
     return float(strength)

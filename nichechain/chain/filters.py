@@ -6,6 +6,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
+from nichechain.births.joins import across_runs
 from nichechain.births.table import LINEAGE, NONE, check_columns
 from nichechain.chain.counts import TransitionCounts
 from nichechain.core.errors import NichechainError
@@ -70,9 +71,7 @@ def counts_of(
         births[name].fill_null(NONE).to_numpy().astype(np.int64)
         for name in ("parent_niche", "child_niche", "parent_uid", "run")
     )
-    # One number for an elite of all runs.
-    span = 1 + elite.max(initial=0)
-    elite = np.where(elite == NONE, NONE, number * span + elite)
+    (elite,) = across_runs(number, elite)
     return TransitionCounts.from_births(parent, child, niches, elite=elite)
 
 

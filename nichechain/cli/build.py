@@ -28,7 +28,7 @@ _MANY_NICHES = 1000
 
 
 @dataclass(frozen=True)
-class Build:
+class BuildCommand:
     """Fill an archive: MAP-Elites that records who was born where."""
 
     domain: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="DOMAIN")]
@@ -94,6 +94,9 @@ class Build:
     """Further options of the domain, such as joints=20 of the arm."""
     workers: Annotated[str | None, console.option("WORKERS", "one thread per processor")] = None
     """Who evaluates: a number of threads, processes:N, ray or ray://HOST:PORT. The result is the same."""
+    cache_memory: Annotated[str | None, console.option("SIZE", "2GiB")] = None
+    """Memory on each machine for physics that was computed before, such as 500MB, or 0 for none. The result
+    is the same."""
     max_failed: float = MOST_FAILED
     """Share of births that may fail, from 0 to 1, before the build is stopped."""
     out: Annotated[Path | None, console.option("PATH", "archives/DOMAIN-seedSEED")] = None
@@ -124,7 +127,7 @@ class Build:
         from nichechain import domains
         from nichechain.niches import parse_bounds, parse_niches, parse_shape
         from nichechain.search.making import check_niches, make_mutation
-        from nichechain.variation.parsing import parse_layer_scales, parse_step_bound
+        from nichechain.variation.additive import parse_layer_scales, parse_step_bound
 
         if self.grid is not None and self.niches is not None:
             raise NichechainError(
@@ -178,7 +181,7 @@ class Build:
         return config
 
     @classmethod
-    def of(cls, config: BuildConfig) -> Build:
+    def of(cls, config: BuildConfig) -> BuildCommand:
         """The options that ask for a configuration."""
         return cls(
             domain=config.domain,
@@ -230,12 +233,12 @@ def domain_option_text(value: DomainOption) -> str:
 
 def run(arguments: Sequence[str]) -> int:
     """Build, then say what came of it."""
-    command = console.parse(Build, arguments)
+    command = console.parse(BuildCommand, arguments)
     from nichechain import execution
     from nichechain.archive import read, write
     from nichechain.archive.build import build
     from nichechain.archive.trust import check_trusted
-    from nichechain.core.locking import writing
+    from nichechain.core.files import writing
     from nichechain.search.making import make_domain
 
     here = str(Path.cwd())
@@ -257,10 +260,10 @@ def run(arguments: Sequence[str]) -> int:
         if command.descriptor is None:
             check_trusted(stored.config, folder)
         # What is not said again stays as it was.
-        command = console.parse(Build, arguments, default=Build.of(stored.config))
+        command = console.parse(BuildCommand, arguments, default=BuildCommand.of(stored.config))
     config = command.config()
     shown = console.console()
-    with execution.make(command.workers) as executor:
+    with execution.make(command.workers, command.cache_memory) as executor:
         if command.force and folder.exists():
             with writing(folder):
                 write.clear(folder)
@@ -296,6 +299,7 @@ def _report(folder: Path, shown: object) -> None:
 
     from nichechain.archive.archive import load
     from nichechain.evolvability import DRAWS, niche_evolvability
+    from nichechain.search import savings
 
     assert isinstance(shown, Console)
     archive = load(folder)
@@ -312,6 +316,7 @@ def _report(folder: Path, shown: object) -> None:
         "births": f"{births}, {counts.births_outside} of them outside the grid"
         + (f", {failed} failed" if failed else ""),
         "rows of T observed": f"{counts.rows_observed} of {n}",
+        **console.physics(savings.read(folder)),
         "archive": str(folder),
     }
     shown.print()

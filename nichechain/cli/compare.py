@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import tyro
 
 from nichechain.cli import console
+from nichechain.core.checks import check_at_least
 from nichechain.core.errors import NichechainError
 
 if TYPE_CHECKING:
@@ -23,7 +24,7 @@ _NAMES = {
 
 
 @dataclass(frozen=True)
-class Compare:
+class CompareCommand:
     """l-evolvability, reach and coverage of one archive against another of the same niches."""
 
     first: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="A")]
@@ -48,15 +49,14 @@ class Compare:
 
 def run(arguments: Sequence[str]) -> int:
     """Compare."""
-    command = console.parse(Compare, arguments)
+    command = console.parse(CompareCommand, arguments)
     from nichechain.archive import read
     from nichechain.archive.archive import load
     from nichechain.evolvability.question import Question
     from nichechain.validation.contrast import contrast
 
     Question(command.l, command.lineages)
-    if command.seed < 0:
-        raise NichechainError(f"--seed is {command.seed}, but must not be negative")
+    check_at_least(0, **{"--seed": command.seed})
     archives = load(command.first), load(command.second)
     if archives[0].niches != archives[1].niches:
         raise NichechainError(

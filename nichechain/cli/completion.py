@@ -26,7 +26,7 @@ complete -o filenames -F _nichechain nichechain"""
 
 
 @dataclass(frozen=True)
-class Completion:
+class CompletionCommand:
     """A script that teaches a shell to complete commands and options."""
 
     shell: Annotated[Literal["bash", "zsh", "fish"], tyro.conf.Positional]
@@ -35,7 +35,7 @@ class Completion:
 
 def run(arguments: Sequence[str]) -> int:
     """Write the script."""
-    shell = console.parse(Completion, arguments).shell
+    shell = console.parse(CompletionCommand, arguments).shell
     words = {command: list(_words(command)) for command in COMMANDS}
     if shell == "fish":
         print(_fish(words))
@@ -59,7 +59,7 @@ def _words(command: str) -> Iterator[str]:
         if isinstance(value, type) and is_dataclass(value) and value.__module__ == module.__name__
     ]
     if command == "walks":
-        yield from (each.__name__.lower() for each in made if not each.__name__.startswith("_"))
+        yield from (console.called(each) for each in made if not each.__name__.startswith("_"))
     seen: set[str] = set()
     for each in made:
         hints = get_type_hints(each, include_extras=True)

@@ -13,7 +13,8 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
-    from nichechain.archive.filling import Progress
+    from nichechain.archive.filling import BuildProgress
+    from nichechain.search.savings import Savings
 
 Command = TypeVar("Command")
 
@@ -36,11 +37,11 @@ def parse(
     default : instance, optional
         Values of the options that are not given.
     name : str, optional
-        What the command is called, by default as its class.
+        What the command is called, by default as its class without ``Command``.
     """
     import tyro
 
-    name = name or command.__name__.lower()
+    name = name or called(command)
     if "--json" in arguments and any(f.name == "format" for f in fields(command)):  # type: ignore[arg-type]
         # The one spelling that every command with a table knows.
         place = list(arguments).index("--json")
@@ -48,6 +49,11 @@ def parse(
     given = {} if default is None else {"default": default}
     read: Command = tyro.cli(command, prog=f"nichechain {name}", args=list(arguments), **given)  # type: ignore[call-overload]
     return read
+
+
+def called(command: Callable[..., Command]) -> str:
+    """What users call a command, from the name of its class."""
+    return command.__name__.removesuffix("Command").lower()
 
 
 def option(metavar: str, default: str) -> Any:
@@ -87,6 +93,14 @@ def facts(rows: dict[str, str]) -> Table:
     return made
 
 
+def physics(savings: Savings) -> dict[str, str]:
+    """The line on physics that was not computed, where a domain kept count."""
+    if not savings.steps:
+        return {}
+    share = savings.known / savings.steps
+    return {"physics spared": f"{share:.0%} of {savings.steps} steps, known from earlier episodes"}
+
+
 def leave_at_next_interrupt() -> None:
     """Have Ctrl-C end the process at once: all is kept, and only a rollout is still waited for."""
     import os
@@ -103,7 +117,7 @@ def spinner(text: str) -> Any:
 
 
 @contextmanager
-def build_progress(total: int) -> Iterator[Callable[[Progress], None]]:
+def build_progress(total: int) -> Iterator[Callable[[BuildProgress], None]]:
     """A progress bar on standard error; plain lines now and then where that is no terminal."""
     from rich.console import Console
 
@@ -116,7 +130,7 @@ def build_progress(total: int) -> Iterator[Callable[[Progress], None]]:
 
 
 @contextmanager
-def _bar(shown: Console, total: int) -> Iterator[Callable[[Progress], None]]:
+def _bar(shown: Console, total: int) -> Iterator[Callable[[BuildProgress], None]]:
     from rich import progress
 
     columns = (
@@ -133,7 +147,7 @@ def _bar(shown: Console, total: int) -> Iterator[Callable[[Progress], None]]:
         task = bar.add_task("", total=total, rate="-", filled=0, outside=0, failed="")
         clock = _Clock()
 
-        def tell(now: Progress) -> None:
+        def tell(now: BuildProgress) -> None:
             clock.begin(now.births)
             bar.update(
                 task,
@@ -147,11 +161,11 @@ def _bar(shown: Console, total: int) -> Iterator[Callable[[Progress], None]]:
         yield tell
 
 
-def _lines(total: int) -> Callable[[Progress], None]:
+def _lines(total: int) -> Callable[[BuildProgress], None]:
     clock = _Clock()
     last = time.monotonic()
 
-    def tell(now: Progress) -> None:
+    def tell(now: BuildProgress) -> None:
         nonlocal last
         clock.begin(now.births)
         if time.monotonic() - last < _LINE_EVERY:

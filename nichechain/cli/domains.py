@@ -19,7 +19,7 @@ _SECONDS = 0.5
 
 
 @dataclass(frozen=True)
-class Domains:
+class DomainsCommand:
     """Domains that a build can search: nichechain's own, and those that installed packages bring."""
 
     speed: tyro.conf.FlagCreatePairsOff[bool] = False
@@ -30,7 +30,7 @@ class Domains:
 
 def run(arguments: Sequence[str]) -> int:
     """List the domains."""
-    command = console.parse(Domains, arguments)
+    command = console.parse(DomainsCommand, arguments)
     from rich.markup import escape
 
     from nichechain import domains

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import tyro
 
 from nichechain.cli import console
+from nichechain.core.checks import check_at_least
 from nichechain.core.errors import NichechainError
 
 if TYPE_CHECKING:
@@ -24,7 +25,7 @@ FORMATS = (".png", ".svg", ".pdf")
 
 
 @dataclass(frozen=True)
-class Estimate:
+class EstimateCommand:
     """The estimate of T from births; which estimator foretells births best; whether they are enough."""
 
     path: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="PATH")]
@@ -53,7 +54,7 @@ class Estimate:
 
 def run(arguments: Sequence[str]) -> int:
     """Say what the births say of T."""
-    command = console.parse(Estimate, arguments)
+    command = console.parse(EstimateCommand, arguments)
     _check(command)
     from nichechain.archive.archive import load
 
@@ -67,7 +68,7 @@ def run(arguments: Sequence[str]) -> int:
     return 0
 
 
-def _check(command: Estimate) -> None:
+def _check(command: EstimateCommand) -> None:
     if command.compare and command.stability:
         raise NichechainError("--compare and --stability exclude each other: ask for one of them")
     belongs: dict[str, tuple[bool, dict[str, object]]] = {
@@ -81,10 +82,7 @@ def _check(command: Estimate) -> None:
         for name, value in options.items():
             if value is not None and not asked:
                 raise NichechainError(f"{name} belongs to {owner}, which is not given")
-    for name in ("seed", "min_births"):
-        if getattr(command, name) < 0:
-            option = name.replace("_", "-")
-            raise NichechainError(f"--{option} is {getattr(command, name)}, but must not be negative")
+    check_at_least(0, **{"--seed": command.seed, "--min-births": command.min_births})
     if command.out is not None:
         if command.out.suffix.lower() not in FORMATS:
             raise NichechainError(
@@ -96,7 +94,7 @@ def _check(command: Estimate) -> None:
             )
 
 
-def _estimate(command: Estimate, archive: Archive) -> None:
+def _estimate(command: EstimateCommand, archive: Archive) -> None:
     chain = archive.chain(command.estimator)
     counts, posterior = archive.counts, chain.posterior
     births = int(counts.births.sum())
@@ -145,7 +143,7 @@ def _estimate(command: Estimate, archive: Archive) -> None:
     _write(pd.DataFrame([content]), content, command)
 
 
-def _compare(command: Estimate, archive: Archive) -> None:
+def _compare(command: EstimateCommand, archive: Archive) -> None:
     from nichechain.validation.held_out import compare_estimators
 
     with console.spinner("holding out elites"):
@@ -179,7 +177,7 @@ def _show_comparison(found: Comparison) -> None:
     )
 
 
-def _stability(command: Estimate, archive: Archive) -> None:
+def _stability(command: EstimateCommand, archive: Archive) -> None:
     from nichechain.validation.stability import rank_stability
 
     with console.spinner("thinning births"):
@@ -235,7 +233,7 @@ def _records(frame: pd.DataFrame) -> Any:
     return json.loads(frame.to_json(orient="records"))
 
 
-def _write(frame: pd.DataFrame, content: dict[str, Any], command: Estimate) -> None:
+def _write(frame: pd.DataFrame, content: dict[str, Any], command: EstimateCommand) -> None:
     print(
         frame.to_csv(index=False) if command.format == "csv" else json.dumps(content, indent=2) + "\n", end=""
     )

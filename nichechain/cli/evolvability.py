@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import tyro
 
 from nichechain.cli import console
+from nichechain.core.checks import check_at_least
 from nichechain.core.errors import NichechainError
 
 if TYPE_CHECKING:
@@ -22,7 +23,7 @@ _LABELS = {"posterior": "90 % interval", "prior": "prior band", "bootstrap": "90
 
 
 @dataclass(frozen=True)
-class Evolvability:
+class EvolvabilityCommand:
     """l-evolvability of niches, or of the genotype of an elite."""
 
     path: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="PATH")]
@@ -62,6 +63,9 @@ class Evolvability:
     """Seed of draws, simulations and offspring."""
     workers: Annotated[str | None, console.option("WORKERS", "one thread per processor")] = None
     """Who evaluates an elite's offspring: a number of threads, processes:N, ray or ray://HOST:PORT."""
+    cache_memory: Annotated[str | None, console.option("SIZE", "2GiB")] = None
+    """Memory on each machine for physics that was computed before, such as 500MB, or 0 for none. The result
+    is the same."""
     format: Literal["table", "csv", "json"] = "table"
     """How to write it."""
 
@@ -73,7 +77,7 @@ class Evolvability:
 
 def run(arguments: Sequence[str]) -> int:
     """Score niches or an elite."""
-    command = console.parse(Evolvability, arguments)
+    command = console.parse(EvolvabilityCommand, arguments)
     _check(command)
     from nichechain.archive.archive import load
     from nichechain.evolvability.question import Question
@@ -92,7 +96,7 @@ def run(arguments: Sequence[str]) -> int:
     return 0
 
 
-def _check(command: Evolvability) -> None:
+def _check(command: EvolvabilityCommand) -> None:
     chosen = {"--niche": command.niche, "--elite": command.elite, "--top": command.top}
     given = [name for name, value in chosen.items() if value is not None]
     if len(given) > 1:
@@ -106,16 +110,12 @@ def _check(command: Evolvability) -> None:
         if command.method != "exact":
             raise NichechainError(f"{wanted} is computed in closed form, not by {command.method}")
     for name in ("top", "offspring", "draws", "repeats"):
-        value = getattr(command, name)
-        if value is not None and value < 1:
-            raise NichechainError(f"--{name} is {value}, but must be at least 1")
-    for name in ("seed", "min_births"):
-        if getattr(command, name) < 0:
-            option = name.replace("_", "-")
-            raise NichechainError(f"--{option} is {getattr(command, name)}, but must not be negative")
+        if getattr(command, name) is not None:
+            check_at_least(1, **{f"--{name}": getattr(command, name)})
+    check_at_least(0, **{"--seed": command.seed, "--min-births": command.min_births})
 
 
-def _one(command: Evolvability, archive: Archive, chain: NicheChain) -> pd.DataFrame:
+def _one(command: EvolvabilityCommand, archive: Archive, chain: NicheChain) -> pd.DataFrame:
     """One row, for a niche or the genotype of its elite."""
     import pandas as pd
 
@@ -135,7 +135,10 @@ def _one(command: Evolvability, archive: Archive, chain: NicheChain) -> pd.DataF
         assert command.elite is not None
         elite = archive.elite(parse_niche(command.elite, "--elite"))
         state = elite.state
-        with execution.make(command.workers) as executor, console.spinner("evaluating the elite's offspring"):
+        with (
+            execution.make(command.workers, command.cache_memory) as executor,
+            console.spinner("evaluating the elite's offspring"),
+        ):
             result = genotype_evolvability(
                 archive,
                 elite,
@@ -149,7 +152,7 @@ def _one(command: Evolvability, archive: Archive, chain: NicheChain) -> pd.DataF
     return pd.DataFrame([{**root, "root": "niche" if command.niche is not None else "elite", **values}])
 
 
-def _best(command: Evolvability, chain: NicheChain) -> pd.DataFrame:
+def _best(command: EvolvabilityCommand, chain: NicheChain) -> pd.DataFrame:
     """The best niches, best first."""
     from nichechain.evolvability import niche_evolvability
 
@@ -167,7 +170,7 @@ def _best(command: Evolvability, chain: NicheChain) -> pd.DataFrame:
     return frame
 
 
-def _set_band(frame: pd.DataFrame, command: Evolvability, archive: Archive) -> None:
+def _set_band(frame: pd.DataFrame, command: EvolvabilityCommand, archive: Archive) -> None:
     """Put the bounds of another band in place of the posterior's interval."""
     from nichechain.evolvability import bootstrap_elites, prior_sensitivity
 
@@ -195,7 +198,7 @@ def _set_band(frame: pd.DataFrame, command: Evolvability, archive: Archive) -> N
     frame["high"] = frame["value"] + (band.high - band.value)[niche]
 
 
-def _write(frame: pd.DataFrame, command: Evolvability) -> None:
+def _write(frame: pd.DataFrame, command: EvolvabilityCommand) -> None:
     if command.format == "csv":
         print(frame.to_csv(index=False), end="")
         return

@@ -10,11 +10,12 @@ from typing import Annotated, Literal
 import tyro
 
 from nichechain.cli import console
+from nichechain.core.checks import check_at_least
 from nichechain.core.errors import NichechainError
 
 
 @dataclass(frozen=True)
-class Explore:
+class ExploreCommand:
     """Write a page on which one clicks a niche and sees where its descendants go.
 
     The page is one HTML file that needs no network.
@@ -38,13 +39,12 @@ class Explore:
 
 def run(arguments: Sequence[str]) -> int:
     """Write the page."""
-    command = console.parse(Explore, arguments)
+    command = console.parse(ExploreCommand, arguments)
     if not command.out.parent.is_dir():
         raise NichechainError(f"--out is {str(command.out)!r}, but there is no folder {command.out.parent}")
     if command.out.is_dir():
         raise NichechainError(f"--out is {str(command.out)!r}, but that is a folder")
-    if command.seed < 0:
-        raise NichechainError(f"--seed is {command.seed}, but must not be negative")
+    check_at_least(0, **{"--seed": command.seed})
     from nichechain.archive.archive import load
     from nichechain.plots.explorer import write_explorer
 

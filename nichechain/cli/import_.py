@@ -15,7 +15,7 @@ from nichechain.search.config import Outside
 
 
 @dataclass(frozen=True)
-class Import:
+class ImportCommand:
     """Make an archive of births that another program logged: no domain is needed, nothing is evaluated."""
 
     log: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FILE")]
@@ -54,7 +54,7 @@ class Import:
 
 def run(arguments: Sequence[str]) -> int:
     """Import."""
-    command = console.parse(Import, arguments)
+    command = console.parse(ImportCommand, arguments)
     for name in ("parent", "child"):
         if getattr(command, name) is not None and getattr(command, f"{name}_behavior") is not None:
             raise NichechainError(f"--{name} and --{name}-behavior exclude each other: give one of them")

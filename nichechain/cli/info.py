@@ -13,7 +13,7 @@ from nichechain.cli import console
 
 
 @dataclass(frozen=True)
-class Info:
+class InfoCommand:
     """What is in an archive, with the configuration and versions that made it."""
 
     path: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="PATH")]
@@ -24,14 +24,16 @@ class Info:
 
 def run(arguments: Sequence[str]) -> int:
     """Say what is in the archive."""
-    command = console.parse(Info, arguments)
+    command = console.parse(InfoCommand, arguments)
     import pyarrow.compute as pc
 
     from nichechain.archive import read
     from nichechain.archive.archive import load
     from nichechain.births.table import LINEAGE
+    from nichechain.search import savings
 
     archive = load(command.path)
+    saved = savings.read(archive.folder)
     meta, counts, config = archive.meta, archive.counts, archive.config
     flags = read.read_births(archive.folder, meta, [LINEAGE])[LINEAGE]
     of_lineages = int(pc.sum(flags).as_py() or 0)
@@ -52,6 +54,8 @@ def run(arguments: Sequence[str]) -> int:
         "births_failed": meta.births - int(counts.visits.sum()),
         "deepest_elite": int(archive.elites.depth.max()) if len(archive.elites) else 0,
         "genotype_length": int(archive.elites.genotype.shape[1]),
+        "physics_steps": saved.steps,
+        "physics_steps_known": saved.known,
         "bytes": size,
     }
     if command.format == "json":
@@ -84,6 +88,7 @@ def run(arguments: Sequence[str]) -> int:
         "rows of T observed": str(content["rows_of_T_observed"]),
         "deepest elite": f"{content['deepest_elite']} generations",
         "genotype": f"{content['genotype_length']} parameters",
+        **console.physics(saved),
         "on disk": f"{size / 1e6:.1f} MB",
     }
     shown = console.console()

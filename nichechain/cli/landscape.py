@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import tyro
 
 from nichechain.cli import console
+from nichechain.core.checks import check_at_least
 from nichechain.core.errors import NichechainError
 from nichechain.search.config import BuildConfig, MutationName
 
@@ -62,6 +63,9 @@ class LandscapeCommand:
     """Seed of the offspring, of the sample of elites and of posterior draws."""
     workers: Annotated[str | None, console.option("WORKERS", "one thread per processor")] = None
     """Who evaluates: a number of threads, processes:N, ray or ray://HOST:PORT. The result is the same."""
+    cache_memory: Annotated[str | None, console.option("SIZE", "2GiB")] = None
+    """Memory on each machine for physics that was computed before, such as 500MB, or 0 for none. The result
+    is the same."""
     out: Annotated[Path | None, console.option("FILE", "NAME-landscape.csv")] = None
     """Table to write, .csv or .parquet; beside it the summary (.json) and the maps (.png)."""
     resume: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
@@ -74,7 +78,7 @@ class LandscapeCommand:
 
 def run(arguments: Sequence[str]) -> int:
     """Measure, write, and say what came of it."""
-    command = console.parse(LandscapeCommand, arguments, name="landscape")
+    command = console.parse(LandscapeCommand, arguments)
     from nichechain import execution
     from nichechain.archive.archive import load
     from nichechain.evolvability.question import Question
@@ -85,10 +89,7 @@ def run(arguments: Sequence[str]) -> int:
 
     check_sample_size(command.offspring)
     Question(command.l, command.lineages)
-    for name in ("top", "min_births"):
-        if getattr(command, name) < 0:
-            option = name.replace("_", "-")
-            raise NichechainError(f"--{option} is {getattr(command, name)}, but must not be negative")
+    check_at_least(0, **{"--top": command.top, "--min-births": command.min_births})
     by = find_measure(command.by)
     if command.map is not None and command.map != _NO_MAPS:
         find_measures(command.map.split(","))
@@ -112,7 +113,7 @@ def run(arguments: Sequence[str]) -> int:
     total = measured * (1 + command.offspring)
     done = 0
     shown = console.console()
-    with execution.make(command.workers) as executor:
+    with execution.make(command.workers, command.cache_memory) as executor:
         try:
             with console.counting(total, "evaluations") as tell:
 
@@ -164,7 +165,7 @@ def _check_out(out: Path) -> None:
 
 def _config(command: LandscapeCommand, archive: Archive) -> BuildConfig:
     """The archive's configuration, with the mutation that is asked for."""
-    from nichechain.variation.parsing import parse_step_bound
+    from nichechain.variation.additive import parse_step_bound
 
     config = archive.config
     if command.mutation is not None and command.mutation != config.mutation:

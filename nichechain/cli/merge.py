@@ -13,7 +13,7 @@ from nichechain.cli import console
 
 
 @dataclass(frozen=True)
-class Merge:
+class MergeCommand:
     """Make one archive of several of one domain, niches and mutation: counts add, the largest key wins."""
 
     paths: Annotated[tuple[str, ...], tyro.conf.Positional, tyro.conf.arg(metavar="PATH")]
@@ -24,7 +24,7 @@ class Merge:
 
 def run(arguments: Sequence[str]) -> int:
     """Merge."""
-    command = console.parse(Merge, arguments)
+    command = console.parse(MergeCommand, arguments)
     from nichechain.archive.archive import load
     from nichechain.archive.merge import merge
 

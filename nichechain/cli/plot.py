@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import tyro
 
 from nichechain.cli import console
+from nichechain.core.checks import check_at_least
 from nichechain.core.errors import NichechainError
 
 if TYPE_CHECKING:
@@ -26,7 +27,7 @@ _FEW_DRAWS = 5
 
 
 @dataclass(frozen=True)
-class Plot:
+class PlotCommand:
     """Draw an archive over behavior space, or its chain."""
 
     path: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="PATH")]
@@ -72,7 +73,7 @@ class Plot:
 
 def run(arguments: Sequence[str]) -> int:
     """Draw."""
-    command = console.parse(Plot, arguments)
+    command = console.parse(PlotCommand, arguments)
     out = command.out or Path(f"{command.kind}.png")
     if out.suffix.lower() not in FORMATS:
         raise NichechainError(f"--out is {str(out)!r}, but must end in one of {', '.join(FORMATS)}")
@@ -80,8 +81,7 @@ def run(arguments: Sequence[str]) -> int:
         raise NichechainError(f"--out is {str(out)!r}, but there is no folder {out.parent}")
     if not 10 <= command.dpi <= 2000:
         raise NichechainError(f"--dpi is {command.dpi}, but must be between 10 and 2000")
-    if command.min_births < 0:
-        raise NichechainError(f"--min-births is {command.min_births}, but must not be negative")
+    check_at_least(0, **{"--min-births": command.min_births})
     if command.threshold is not None and command.kind not in _WITH_THRESHOLD:
         raise NichechainError(f"--threshold belongs to {', '.join(_WITH_THRESHOLD)}, not to {command.kind}")
     from nichechain.archive.archive import load
@@ -108,7 +108,7 @@ def run(arguments: Sequence[str]) -> int:
     return 0
 
 
-def _draw_pair(command: Plot, archive: Archive, left: Axes, right: Axes) -> None:
+def _draw_pair(command: PlotCommand, archive: Archive, left: Axes, right: Axes) -> None:
     from nichechain.evolvability import niche_evolvability
 
     chain = archive.chain(command.estimator)
@@ -138,7 +138,7 @@ def _draw_pair(command: Plot, archive: Archive, left: Axes, right: Axes) -> None
     left.figure.suptitle(chain.estimator, fontsize="small", color="#555555")
 
 
-def _draw(command: Plot, archive: Archive, ax: Axes) -> None:
+def _draw(command: PlotCommand, archive: Archive, ax: Axes) -> None:
     from nichechain import plots
 
     match command.kind:

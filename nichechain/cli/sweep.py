@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 from nichechain.cli import console
+from nichechain.core.checks import check_at_least
 from nichechain.core.errors import NichechainError
 
 if TYPE_CHECKING:
@@ -20,7 +21,7 @@ FORMATS = (".png", ".svg", ".pdf")
 
 
 @dataclass(frozen=True)
-class Sweep:
+class SweepCommand:
     """Bin an archive's births into grids of other sizes: too few niches, too many, and a suggestion."""
 
     path: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="PATH")]
@@ -47,7 +48,7 @@ class Sweep:
 
 def run(arguments: Sequence[str]) -> int:
     """Sweep, and say what was found."""
-    command = console.parse(Sweep, arguments)
+    command = console.parse(SweepCommand, arguments)
     _check(command)
     from nichechain.archive.archive import load
     from nichechain.validation.grid_size import sweep
@@ -135,14 +136,9 @@ def _numbers(text: str) -> list[float]:
         raise NichechainError(f"--behavior is {text!r}, but must be numbers such as 1.3,0.7") from None
 
 
-def _check(command: Sweep) -> None:
-    for name in ("min_births", "draws"):
-        if getattr(command, name) < 1:
-            raise NichechainError(
-                f"--{name.replace('_', '-')} is {getattr(command, name)}, but must be at least 1"
-            )
-    if command.seed < 0:
-        raise NichechainError(f"--seed is {command.seed}, but must not be negative")
+def _check(command: SweepCommand) -> None:
+    check_at_least(1, **{"--min-births": command.min_births, "--draws": command.draws})
+    check_at_least(0, **{"--seed": command.seed})
     if command.out is not None:
         if command.out.suffix.lower() not in FORMATS:
             raise NichechainError(

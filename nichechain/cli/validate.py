@@ -24,7 +24,7 @@ _LINE_EVERY = 10.0
 
 
 @dataclass(frozen=True)
-class Validate:
+class ValidateCommand:
     """Test whether births are a Markov chain's, and check its predictions on lineages really run."""
 
     path: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="PATH")]
@@ -41,13 +41,16 @@ class Validate:
     """Seed of the choice of elites, of their lineages, of permutations and of draws."""
     workers: Annotated[str | None, console.option("WORKERS", "one thread per processor")] = None
     """Who evaluates: a number of threads, processes:N, ray or ray://HOST:PORT. The result is the same."""
+    cache_memory: Annotated[str | None, console.option("SIZE", "2GiB")] = None
+    """Memory on each machine for physics that was computed before, such as 500MB, or 0 for none. The result
+    is the same."""
     out: Annotated[Path | None, console.option("DIR", "NAME-validation")] = None
     """Folder for validation.json, calibration.png and lineages.csv."""
 
 
 def run(arguments: Sequence[str]) -> int:
     """Validate."""
-    command = console.parse(Validate, arguments)
+    command = console.parse(ValidateCommand, arguments)
     from nichechain import execution
     from nichechain.archive.archive import load
     from nichechain.validation import ValidationConfig, validate
@@ -63,7 +66,10 @@ def run(arguments: Sequence[str]) -> int:
     out = command.out or Path(f"{archive.folder.name}-validation")
     if out.exists() and not out.is_dir():
         raise NichechainError(f"--out is {str(out)!r}, but that is a file, not a folder")
-    with execution.make(command.workers) as executor, _progress(config.evaluations) as tell:
+    with (
+        execution.make(command.workers, command.cache_memory) as executor,
+        _progress(config.evaluations) as tell,
+    ):
         result = validate(archive, executor, config, on_done=tell)
     # Made only now, so that bad input leaves nothing behind.
     out.mkdir(parents=True, exist_ok=True)

@@ -27,7 +27,7 @@ _GROUPS = {
 
 
 @dataclass(frozen=True)
-class Verify:
+class VerifyCommand:
     """Make parts of an archive again from its configuration, and compare to the last bit.
 
     Exit status 0: all that was compared agrees, or what differs can be due to a library or a machine
@@ -43,6 +43,9 @@ class Verify:
     """Seed of the choice of these."""
     workers: Annotated[str | None, console.option("WORKERS", "one thread per processor")] = None
     """Who evaluates: a number of threads, processes:N, ray or ray://HOST:PORT. The result is the same."""
+    cache_memory: Annotated[str | None, console.option("SIZE", "2GiB")] = None
+    """Memory on each machine for physics that was computed before, such as 500MB, or 0 for none. The result
+    is the same."""
     strict: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
     """Exit with status 1 whatever the cause of a difference."""
     json: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
@@ -51,7 +54,7 @@ class Verify:
 
 def run(arguments: Sequence[str]) -> int:
     """Verify."""
-    command = console.parse(Verify, arguments)
+    command = console.parse(VerifyCommand, arguments)
     from nichechain import execution
     from nichechain.archive.archive import load
     from nichechain.verification import verify
@@ -59,7 +62,7 @@ def run(arguments: Sequence[str]) -> int:
     sample = _sample(command.sample)
     archive = load(command.path)
     began = time.monotonic()
-    with execution.make(command.workers) as executor, console.stages() as tell:
+    with execution.make(command.workers, command.cache_memory) as executor, console.stages() as tell:
         result = verify(
             archive,
             sample=sample,

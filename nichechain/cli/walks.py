@@ -94,6 +94,9 @@ class _Walks:
     """Options of the domain, such as joints=20 of the arm, or descriptor=final-xy of a gym:ENV_ID."""
     workers: Annotated[str | None, console.option("WORKERS", "one thread per processor")] = None
     """Who evaluates: a number of threads, processes:N, ray or ray://HOST:PORT. The result is the same."""
+    cache_memory: Annotated[str | None, console.option("SIZE", "2GiB")] = None
+    """Memory on each machine for physics that was computed before, such as 500MB, or 0 for none. The result
+    is the same."""
 
     def base(self) -> Condition:
         """What all conditions share."""
@@ -104,7 +107,7 @@ class _Walks:
 
 
 @dataclass(frozen=True)
-class Pressure(_Walks):
+class PressureCommand(_Walks):
     """Walks under rising evolutionary pressure, from random to highly selective."""
 
     levels: str = "selective,0.1,0.25,0.5,0.75,random"
@@ -122,7 +125,7 @@ class Pressure(_Walks):
 
 
 @dataclass(frozen=True)
-class Metrics(_Walks):
+class MetricsCommand(_Walks):
     """Highly selective walks, each kind selecting for another diversity metric."""
 
     metrics: str = "kde,knn,knn-no-archive,ancestors,parent"
@@ -140,7 +143,7 @@ class Metrics(_Walks):
 
 
 @dataclass(frozen=True)
-class Sensitivity(_Walks):
+class SensitivityCommand(_Walks):
     """Highly selective walks, each kind with another value of one parameter."""
 
     vary: Literal["scale", "bandwidth-mode", "decay", "k", "offspring", "initialisation"] = "scale"
@@ -160,7 +163,7 @@ class Sensitivity(_Walks):
 
 
 @dataclass(frozen=True)
-class Resume:
+class ResumeCommand:
     """Go on with a study that was begun."""
 
     path: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="PATH")]
@@ -169,10 +172,13 @@ class Resume:
     """Walks of each kind."""
     workers: Annotated[str | None, console.option("WORKERS", "one thread per processor")] = None
     """Who evaluates: a number of threads, processes:N, ray or ray://HOST:PORT. The result is the same."""
+    cache_memory: Annotated[str | None, console.option("SIZE", "2GiB")] = None
+    """Memory on each machine for physics that was computed before, such as 500MB, or 0 for none. The result
+    is the same."""
 
 
 @dataclass(frozen=True)
-class Report:
+class ReportCommand:
     """Tables, tests, figure and report of a study that was walked, or is being walked."""
 
     path: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="PATH")]
@@ -186,30 +192,30 @@ def run(arguments: Sequence[str]) -> int:
         return 0
     verb, rest = arguments[0], arguments[1:]
     if verb == "report":
-        return _report(console.parse(Report, rest, name="walks report").path)
+        return _report(console.parse(ReportCommand, rest, name="walks report").path)
     if verb == "resume":
-        return _resume(console.parse(Resume, rest, name="walks resume"))
+        return _resume(console.parse(ResumeCommand, rest, name="walks resume"))
     if verb == "pressure":
-        return _begin(console.parse(Pressure, rest, name="walks pressure"), "pressure")
+        return _begin(console.parse(PressureCommand, rest, name="walks pressure"), "pressure")
     if verb == "metrics":
-        return _begin(console.parse(Metrics, rest, name="walks metrics"), "metrics")
+        return _begin(console.parse(MetricsCommand, rest, name="walks metrics"), "metrics")
     if verb == "sensitivity":
-        return _begin(console.parse(Sensitivity, rest, name="walks sensitivity"), "sensitivity")
+        return _begin(console.parse(SensitivityCommand, rest, name="walks sensitivity"), "sensitivity")
     raise NichechainError(
         f"there is no study {verb!r}: it must be one of pressure, metrics, sensitivity, resume or report"
     )
 
 
-def _begin(command: Pressure | Metrics | Sensitivity, kind: Kind) -> int:
+def _begin(command: PressureCommand | MetricsCommand | SensitivityCommand, kind: Kind) -> int:
     from nichechain import domains
     from nichechain.cli.build import domain_option
 
     options = dict(domain_option(text) for text in command.options)
     domain = domains.make(command.domain, seed=command.domain_seed, **options)
-    return _walk(_study(command, kind, domain, options), domain, command.out, command.workers)
+    return _walk(_study(command, kind, domain, options), domain, command.out, command)
 
 
-def _resume(command: Resume) -> int:
+def _resume(command: ResumeCommand) -> int:
     from nichechain.archive.trust import check_trusted
     from nichechain.search.config import BuildConfig
     from nichechain.studies.running import read_study
@@ -219,14 +225,14 @@ def _resume(command: Resume) -> int:
     check_trusted(same, command.path)
     if command.runs is not None:
         study = replace(study, runs=command.runs)
-    return _walk(study, study.make_domain(), command.path, command.workers)
+    return _walk(study, study.make_domain(), command.path, command)
 
 
-def _walk(study: Study, domain: Domain, folder: Path, workers: str | None) -> int:
+def _walk(study: Study, domain: Domain, folder: Path, command: _Walks | ResumeCommand) -> int:
     from nichechain import execution
     from nichechain.studies.running import run as walk_study
 
-    with execution.make(workers) as executor:
+    with execution.make(command.workers, command.cache_memory) as executor:
         with console.spinner("loading the domain"):
             domain.evaluate(domain.sample(1, seed=0))
         try:
@@ -324,7 +330,10 @@ def _words(text: str) -> list[str]:
 
 
 def _study(
-    command: Pressure | Metrics | Sensitivity, kind: Kind, domain: Domain, options: Mapping[str, DomainOption]
+    command: PressureCommand | MetricsCommand | SensitivityCommand,
+    kind: Kind,
+    domain: Domain,
+    options: Mapping[str, DomainOption],
 ) -> Study:
     """What is asked for, checked."""
     from nichechain.niches import parse_bounds, parse_shape

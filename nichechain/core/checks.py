@@ -122,22 +122,7 @@ def check_seed(seed: object) -> None:
     NichechainError
         If it is no whole number, or a negative one.
     """
-    check_whole(seed=seed)
-    if seed < 0:  # type: ignore[operator]
-        raise NichechainError(f"seed is {seed}, but must not be negative")
-
-
-def check_sample(n: object) -> None:
-    """Refuse what is no number of genotypes to sample: none at all is one.
-
-    Raises
-    ------
-    NichechainError
-        If it is no whole number, or a negative one.
-    """
-    check_whole(n=n)
-    if n < 0:  # type: ignore[operator]
-        raise NichechainError(f"n is {n}, but must not be negative")
+    check_at_least(0, seed=seed)
 
 
 def rng_of(seed: int | np.random.Generator) -> np.random.Generator:

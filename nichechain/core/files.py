@@ -1,10 +1,15 @@
-"""Files that are either the old ones or the new ones, whatever happens in between."""
+"""Files that are either the old ones or the new ones, and folders with one writer at a time."""
 
 from __future__ import annotations
 
+import json
 import os
-from contextlib import suppress
+import platform
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
+
+from nichechain.core.errors import ArchiveError, NichechainError
 
 
 def write_atomically(path: Path, content: bytes) -> None:
@@ -28,12 +33,26 @@ def write_atomically(path: Path, content: bytes) -> None:
             file.flush()
             os.fsync(file.fileno())
         part.replace(path)
-    except OSError:
+    except BaseException:
         # Half a file is of no use, and a full disk needs the room.
         with suppress(OSError):
             part.unlink(missing_ok=True)
         raise
     sync_folder(path.parent)
+
+
+def replace_file(path: str | Path, content: bytes) -> None:
+    """:func:`write_atomically` for a file that somebody named.
+
+    Raises
+    ------
+    NichechainError
+        If it cannot be written; what it held is then still there.
+    """
+    try:
+        write_atomically(Path(path), content)
+    except OSError as error:
+        raise NichechainError(f"{path} cannot be written: {error.strerror}") from error
 
 
 def sync_folder(folder: Path) -> None:
@@ -43,3 +62,56 @@ def sync_folder(folder: Path) -> None:
         os.fsync(descriptor)
     finally:
         os.close(descriptor)
+
+
+_LOCK = ".lock"
+# Beside the lock, for some releases of filelock empty the lock's own file when they only try it.
+_OWNER = ".owner"
+
+
+@contextmanager
+def writing(folder: Path) -> Iterator[None]:
+    """Hold the right to write to a folder; the system lets go of it if the process dies.
+
+    So the lock of a process that crashed is nobody's, whatever it left in the folder.
+
+    Raises
+    ------
+    ArchiveError
+        If another process holds it, or the folder cannot be written to.
+    """
+    from filelock import FileLock, Timeout
+
+    try:
+        if not folder.is_dir():
+            folder.mkdir(parents=True, exist_ok=True)
+            sync_folder(folder.parent)
+        lock = FileLock(folder / _LOCK)
+        lock.acquire(blocking=False)
+    except Timeout:
+        raise ArchiveError(
+            f"{folder} is being written by {_owner(folder)}: wait for it, or stop it"
+        ) from None
+    except (OSError, NotImplementedError) as error:
+        raise ArchiveError(
+            f"{folder} cannot be written to: {getattr(error, 'strerror', None) or error}"
+        ) from error
+    try:
+        # Who we are is a courtesy; without room for it the lock holds all the same.
+        with suppress(OSError):
+            (folder / _OWNER).write_text(json.dumps({"pid": os.getpid(), "host": platform.node()}))
+        yield
+    finally:
+        with suppress(OSError):
+            (folder / _OWNER).unlink(missing_ok=True)
+        lock.release()
+
+
+def _owner(folder: Path) -> str:
+    try:
+        with (folder / _OWNER).open(encoding="utf-8") as file:
+            owner = json.loads(file.read(1000))
+        pid, host = int(owner["pid"]), str(owner["host"])
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
+        return "another process"
+    return f"process {pid} on {host}" if host.isprintable() else f"process {pid}"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import numba
@@ -18,7 +19,7 @@ class RowSampler:
 
     Parameters
     ----------
-    matrix : (S, S) scipy.sparse.csr_array
+    matrix : (m, S) array or scipy.sparse.csr_array
         Rows of non-negative weights; those to be drawn from have some.
 
     Notes
@@ -27,8 +28,8 @@ class RowSampler:
     cell of equal probability that it shares with at most one other entry.
     """
 
-    def __init__(self, matrix: sparse.csr_array) -> None:
-        matrix = matrix.copy()
+    def __init__(self, matrix: Floats | sparse.csr_array) -> None:
+        matrix = sparse.csr_array(matrix, copy=True)
         matrix.sum_duplicates()
         matrix.eliminate_zeros()
         self._start = matrix.indptr.astype(np.int64)
@@ -40,6 +41,13 @@ class RowSampler:
         drawn = np.empty(rows.size, np.int64)
         _draw(self._start, self._column, self._keep, self._other, rows, rng.random(rows.size), drawn)
         return drawn
+
+    def walk(self, here: Ints, steps: int, rng: np.random.Generator) -> Iterator[Ints]:
+        """States of walks, (N,) each: those they begin in, then the next, until there are ``steps``."""
+        yield here
+        for _ in range(steps - 1):
+            here = self.draw(here, rng)
+            yield here
 
 
 @numba.njit(nogil=True, cache=True)

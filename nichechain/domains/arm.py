@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from nichechain.core.checks import check_sample, check_seed, check_whole, rng_of
-from nichechain.core.errors import NichechainError
+from nichechain.core.checks import check_at_least, check_seed, rng_of
 from nichechain.domains.base import Evaluation, check_genotypes
 from nichechain.domains.noise import Noise, check_seeds
 
@@ -46,10 +45,8 @@ class PlanarArm:
     chunk = 4096
 
     def __init__(self, joints: int = 10, *, seed: int = 0) -> None:
-        check_whole(joints=joints)
+        check_at_least(1, joints=joints)
         check_seed(seed)
-        if joints < 1:
-            raise NichechainError(f"joints is {joints}, but an arm has at least 1")
         self.genotype_length = int(joints)
         self.seed = int(seed)
 
@@ -63,7 +60,7 @@ class PlanarArm:
 
     def sample(self, n: int, *, seed: int | np.random.Generator) -> NDArray[np.float32]:
         """Angles uniform in [-0.1, 0.1] radians, (n, joints): a nearly stretched arm."""
-        check_sample(n)
+        check_at_least(0, n=n)
         rng = rng_of(seed)
         return rng.uniform(-0.1, 0.1, (n, self.genotype_length)).astype(np.float32)
 

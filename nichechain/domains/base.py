@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -34,6 +34,9 @@ class Evaluation:
     spread : (N, B) float64 array, optional
         Standard deviation of behavior over the repeats of an evaluation, where a domain repeats
         them; NaN in the rows that failed.
+    steps, known : int
+        Steps of the episodes behind it, and how many of them were known from earlier episodes, where
+        a domain keeps count. What was known depends on what was evaluated before; the rows do not.
     """
 
     behavior: Floats
@@ -41,6 +44,8 @@ class Evaluation:
     failed: NDArray[np.bool_]
     reasons: tuple[str, ...]
     spread: Floats | None = None
+    steps: int = 0
+    known: int = 0
 
     def __len__(self) -> int:
         return len(self.objective)
@@ -60,6 +65,8 @@ class Evaluation:
             np.concatenate([part.failed for part in parts]),
             tuple(reason for part in parts for reason in part.reasons),
             spread,
+            sum(part.steps for part in parts),
+            sum(part.known for part in parts),
         )
 
 
@@ -146,3 +153,77 @@ def check_genotypes(genotypes: ArrayLike, length: int) -> Float32s:
     if array.ndim != 2 or array.shape[1] != length:
         raise NichechainError(f"genotypes have shape {array.shape}, but must be (N, {length})")
     return array
+
+
+class Wrapper:
+    """Passes everything on to a domain.
+
+    Parameters
+    ----------
+    domain : Domain
+    """
+
+    def __init__(self, domain: Domain) -> None:
+        self.domain = domain
+
+    @property
+    def name(self) -> str:
+        """Name on the command line."""
+        return self.domain.name
+
+    @property
+    def seed(self) -> int:
+        """Seed of what the domain holds fixed."""
+        return self.domain.seed
+
+    @property
+    def genotype_length(self) -> int:
+        """Number of evolved parameters."""
+        return self.domain.genotype_length
+
+    @property
+    def network(self) -> Any:
+        """The policy, where the domain has one."""
+        return self.domain.network  # type: ignore[attr-defined]  # or else an AttributeError, as of the domain
+
+    @property
+    def behavior_names(self) -> tuple[str, ...]:
+        """One name per axis of behavior."""
+        return self.domain.behavior_names
+
+    @property
+    def unit(self) -> str:
+        """Unit of behavior."""
+        return self.domain.unit
+
+    @property
+    def objective_name(self) -> str:
+        """What the objective is."""
+        return self.domain.objective_name
+
+    @property
+    def bounds(self) -> tuple[tuple[float, float], ...]:
+        """Default bounds of a grid over behavior."""
+        return self.domain.bounds
+
+    @property
+    def chunk(self) -> int:
+        """Genotypes worth handing to a worker at once."""
+        return self.domain.chunk
+
+    @property
+    def start(self) -> NDArray[np.float64] | None:
+        """Behavior of doing nothing."""
+        return self.domain.start
+
+    def sample(self, n: int, *, seed: int | np.random.Generator) -> NDArray[np.float32]:
+        """Initial genotypes."""
+        return self.domain.sample(n, seed=seed)
+
+    def evaluate(self, genotypes: ArrayLike) -> Evaluation:
+        """Behavior of each genotype."""
+        return self.domain.evaluate(genotypes)
+
+    def controller(self, genotype: ArrayLike) -> nn.Module:
+        """The genotype as something to use outside nichechain."""
+        return self.domain.controller(genotype)

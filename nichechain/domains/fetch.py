@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from nichechain.core.checks import check_seed
 from nichechain.domains.base import Evaluation, check_genotypes
+from nichechain.domains.memory import CACHE_MEMORY, check_cache_memory
 from nichechain.domains.noise import Noise, check_seeds
 from nichechain.domains.policies.controllers import Controller
 from nichechain.domains.policies.networks import network
@@ -18,7 +19,7 @@ from nichechain.domains.policies.networks import network
 if TYPE_CHECKING:
     from torch import nn
 
-    from nichechain.domains.engine.fetch import Disturbance, Episode, FetchEpisodes
+    from nichechain.domains.engine.fetch import Disturbance, FetchEpisodes, Rollout
 
 
 _OUTPUTS = 4
@@ -41,6 +42,15 @@ class FetchTask:
         evolve.
     evolve_biases : bool
         Whether biases of a stack are evolved too; by default they stay 0.
+    cache_memory : int
+        Bytes, in each process, for the cache of motions (see :mod:`nichechain.engine.motions`):
+        physics that an earlier episode has computed is not computed again. The results are the
+        same. 0 turns it off; by default 2 GiB. Only a policy that runs natively has one.
+
+    Raises
+    ------
+    NichechainError
+        If a number is below 0 or no whole number, or the controller does not fit.
 
     Notes
     -----
@@ -62,10 +72,17 @@ class FetchTask:
     steps = 50
 
     def __init__(
-        self, seed: int = 0, *, controller: nn.Module | str = "mlp:32,32", evolve_biases: bool = False
+        self,
+        seed: int = 0,
+        *,
+        controller: nn.Module | str = "mlp:32,32",
+        evolve_biases: bool = False,
+        cache_memory: int = CACHE_MEMORY,
     ) -> None:
         check_seed(seed)
+        check_cache_memory(cache_memory)
         self.seed = int(seed)
+        self._cache_memory = int(cache_memory)
         self.network: Controller = network(controller, self.inputs, _OUTPUTS, evolve_biases=evolve_biases)
         self._episodes_made: FetchEpisodes | None = None
         self._lock = threading.Lock()
@@ -75,10 +92,22 @@ class FetchTask:
 
     def __getstate__(self) -> dict[str, Any]:
         # A model and its pool of states stay in the process that made them.
-        return {"seed": self.seed, "network": self.network}
+        return {"seed": self.seed, "network": self.network, "_cache_memory": self._cache_memory}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state, _episodes_made=None, _lock=threading.Lock())
+
+    @property
+    def cache_memory(self) -> int:
+        """Bytes for the cache of motions; setting it lets go of what it holds."""
+        return self._cache_memory
+
+    @cache_memory.setter
+    def cache_memory(self, cache_memory: int) -> None:
+        check_cache_memory(cache_memory)
+        with self._lock:
+            self._cache_memory = int(cache_memory)
+            self._episodes_made = None
 
     @property
     def genotype_length(self) -> int:
@@ -151,7 +180,7 @@ class FetchTask:
             noise.only("observation", "action", domain=self.name)
         return self._evaluate(rows, (self._disturbance(noise, int(s)) for s in check_seeds(seeds, rows)))
 
-    def episode(self, genotype: ArrayLike) -> Episode:
+    def episode(self, genotype: ArrayLike) -> Rollout:
         """What the policy of one genotype sees and does: 51 observations and 50 actions."""
         (row,) = check_genotypes(np.asarray(genotype)[None], self.genotype_length)
         return self._episodes.run(self.network, row, self.steps)
@@ -185,17 +214,21 @@ class FetchTask:
         behavior = np.full((len(rows), 2), np.nan)
         objective = np.full(len(rows), np.nan)
         reasons = [""] * len(rows)
+        steps = known = 0
         for i, (genotype, disturbance) in enumerate(zip(rows, disturbances, strict=True)):
             if not np.isfinite(genotype).all():
                 reasons[i] = "genotype is not finite"
                 continue
             episode = self._episodes.run(self.network, genotype, self.steps, disturbance)
+            steps += self.steps
+            known += episode.known
             reasons[i] = episode.failure
             if not episode.failure:
                 reached = episode.observations[-1, self.place]
                 behavior[i] = reached[:2]
                 objective[i] = -np.linalg.norm(reached - self._episodes.goal, axis=-1)
-        return Evaluation(behavior, objective, np.array([bool(reason) for reason in reasons]), tuple(reasons))
+        failed = np.array([bool(reason) for reason in reasons])
+        return Evaluation(behavior, objective, failed, tuple(reasons), steps=steps, known=known)
 
     @property
     def _episodes(self) -> FetchEpisodes:
@@ -206,7 +239,9 @@ class FetchTask:
                 if self._episodes_made is None:
                     from nichechain.domains.engine.fetch import fetch_episodes
 
-                    self._episodes_made = fetch_episodes(self.env_id, self.seed, self.network)
+                    self._episodes_made = fetch_episodes(
+                        self.env_id, self.seed, self.network, self._cache_memory
+                    )
         return self._episodes_made
 
 

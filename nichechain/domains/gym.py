@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from nichechain.core.checks import as_bounds, check_seed, check_whole
+from nichechain.core.checks import as_bounds, check_at_least, check_seed
 from nichechain.core.errors import NichechainError
 from nichechain.domains.base import Evaluation, check_genotypes
 from nichechain.domains.descriptors import Descriptor, Episode, FinalObservation, MeanObservation, named
@@ -108,13 +108,9 @@ class GymDomain:
         env_options: Mapping[str, Any] | None = None,
     ) -> None:
         check_seed(seed)
-        check_whole(repeats=repeats)
+        check_at_least(1, repeats=repeats)
         if steps is not None:
-            check_whole(steps=steps)
-        if repeats < 1:
-            raise NichechainError(f"repeats is {repeats}, but at least 1 is needed")
-        if steps is not None and steps < 1:
-            raise NichechainError(f"steps is {steps}, but at least 1 is needed")
+            check_at_least(1, steps=steps)
         self.env_id = env_id
         self.name = PREFIX + env_id
         self.seed = int(seed)

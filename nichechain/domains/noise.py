@@ -15,10 +15,9 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from nichechain.core.checks import check_numbers, check_whole
+from nichechain.core.checks import check_at_least, check_numbers, check_positive
 from nichechain.core.errors import NichechainError
-from nichechain.domains.base import Domain, Evaluation, check_genotypes
-from nichechain.domains.wrapper import Wrapper
+from nichechain.domains.base import Domain, Evaluation, Wrapper, check_genotypes
 
 Floats = NDArray[np.float64]
 Seeds = NDArray[np.int64]
@@ -248,9 +247,7 @@ class Noisy(Wrapper):
     def __init__(self, domain: Domain, noise: Noise, *, repeats: int = 5) -> None:
         if not isinstance(domain, Perturbable):
             raise NichechainError(f"noise cannot act on {domain.name}: it has no method evaluate_noisy")
-        check_whole(repeats=repeats)
-        if repeats < 1:
-            raise NichechainError(f"repeats is {repeats}, but at least 1 is needed")
+        check_at_least(1, repeats=repeats)
         super().__init__(domain)
         self._perturbable: Perturbable = domain
         self.noise = noise
@@ -314,10 +311,8 @@ class WithSensitivity(Wrapper):
             )
         extents = [high - low for low, high in domain.bounds]
         if most is not None:
-            check_numbers(most=most)
+            check_positive(most=most)
         self.most = min(extents) / 4 if most is None else float(most)
-        if not (math.isfinite(self.most) and self.most > 0):
-            raise NichechainError(f"the most sensitivity is {self.most}, but must be a positive number")
         self._columns = [known.index(axis) for axis in axes]
         self._axes = tuple(axes)
 

@@ -123,7 +123,8 @@ def _check(name: str, factory: Callable[..., Domain], options: dict[str, Any]) -
     parameters = inspect.signature(factory).parameters
     if any(parameter.kind is parameter.VAR_KEYWORD for parameter in parameters.values()):
         return
-    known = [parameter for parameter in parameters if parameter != "seed"]
+    # How much memory there is is no property of the domain, and changes nothing of it.
+    known = [parameter for parameter in parameters if parameter not in ("seed", "cache_memory")]
     for option in options:
         if option not in known:
             raise NichechainError(

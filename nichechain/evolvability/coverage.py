@@ -18,7 +18,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 # Cells of the table (repeats, niches) and walks in flight that a simulation keeps at once.
-_SIMULATION_CELLS = 8_000_000
+_CELLS = 8_000_000
 
 # Target niches treated together.
 _COLUMNS = 128
@@ -27,7 +27,7 @@ _COLUMNS = 128
 _DENSE = 0.3
 
 
-class LinearMap(Protocol):
+class LinearOperator(Protocol):
     """A matrix we only multiply with: sparse, dense, or sparse plus low rank."""
 
     @property
@@ -39,8 +39,8 @@ class LinearMap(Protocol):
 
 
 def expected_coverage(
-    transition: LinearMap,
-    first: LinearMap,
+    transition: LinearOperator,
+    first: LinearOperator,
     steps: int,
     lineages: ArrayLike,
     *,
@@ -89,8 +89,8 @@ def expected_coverage(
 
 
 def visit_probabilities(
-    transition: LinearMap,
-    first: LinearMap,
+    transition: LinearOperator,
+    first: LinearOperator,
     steps: int,
     counted: int | None = None,
     columns: int = _COLUMNS,
@@ -124,7 +124,7 @@ def visit_probabilities(
 
 
 def coverage_by_generation(
-    transition: LinearMap, roots: ArrayLike, longest: int, lineages: ArrayLike, counted: int
+    transition: LinearOperator, roots: ArrayLike, longest: int, lineages: ArrayLike, counted: int
 ) -> Floats:
     """Expected niches that lineages of roots visit, for every length up to the longest.
 
@@ -183,7 +183,7 @@ def at_least_once(probability: Floats, trials: Iterable[int]) -> Iterator[Floats
 
 
 def sampled_coverage(
-    transition: LinearMap,
+    transition: LinearOperator,
     first: Floats,
     steps: int,
     lineages: int,
@@ -219,24 +219,49 @@ def sampled_coverage(
     check_at_least(1, steps=steps, lineages=lineages, repeats=repeats)
     states = transition.shape[0]
     niches = _counted(counted, states)
-    step = RowSampler(entries(transition))
-    start = RowSampler(sparse.csr_array(first[None, :]))
-    at_once = max(1, _SIMULATION_CELLS // max(states, lineages))
     found = []
-    for done in range(0, repeats, at_once):
-        size = min(at_once, repeats - done)
-        repeat = np.repeat(np.arange(size), lineages)
-        seen = np.zeros((size, states), bool)
-        here = start.draw(np.zeros(size * lineages, np.int64), rng)
-        seen[repeat, here] = True
-        for _ in range(steps - 1):
-            here = step.draw(here, rng)
+    for repeat, walks in simulated_lineages(transition, first, steps, lineages, repeats, rng, _CELLS):
+        seen = np.zeros((repeat[-1] + 1, states), bool)
+        for here in walks:
             seen[repeat, here] = True
         found.append(np.count_nonzero(seen[:, :niches], axis=1))
     return np.concatenate(found)
 
 
-def entries(transition: LinearMap) -> sparse.csr_array:
+def simulated_lineages(
+    transition: LinearOperator,
+    first: Floats,
+    steps: int,
+    lineages: int,
+    repeats: int,
+    rng: np.random.Generator,
+    cells: int,
+) -> Iterator[tuple[Ints, Iterator[Ints]]]:
+    """Lineages of one root, some repeats at a time.
+
+    Parameters
+    ----------
+    transition, first, steps, lineages, repeats, rng
+        As in :func:`sampled_coverage`.
+    cells : int
+        Cells of a table (repeats, states), and lineages, that are simulated at once.
+
+    Yields
+    ------
+    (N,) int64 array
+        The repeat that each lineage belongs to, counted from 0 again each time.
+    iterator of (N,) int64 arrays
+        Their states, step after step: to be exhausted before the next repeats are asked for.
+    """
+    onward, begin = RowSampler(entries(transition)), RowSampler(first[None, :])
+    at_once = max(1, cells // max(transition.shape[0], lineages))
+    for done in range(0, repeats, at_once):
+        repeat = np.repeat(np.arange(min(at_once, repeats - done)), lineages)
+        start = begin.draw(np.zeros(repeat.size, np.int64), rng)
+        yield repeat, onward.walk(start, steps, rng)
+
+
+def entries(transition: LinearOperator) -> sparse.csr_array:
     """The entries of a matrix, to walk by.
 
     Raises
@@ -315,7 +340,7 @@ def _counted(counted: int | None, states: int) -> int:
     return counted
 
 
-def _faster(transition: LinearMap) -> LinearMap:
+def _faster(transition: LinearOperator) -> LinearOperator:
     """The matrix in the form that multiplies faster."""
     if sparse.issparse(transition) and transition.nnz > _DENSE * transition.shape[0] ** 2:  # type: ignore[attr-defined]
         dense: Floats = transition.toarray()  # type: ignore[attr-defined]

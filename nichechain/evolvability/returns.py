@@ -38,6 +38,29 @@ def return_probabilities(transition: sparse.csr_array, states: Ints, longest: In
     return returns
 
 
+def all_return_probabilities(transition: Floats, steps: int) -> Floats:
+    """Probabilities of being back in every state, by products of whole matrices.
+
+    Parameters
+    ----------
+    transition : (S, S) row-stochastic array
+    steps : int
+        At least 1.
+
+    Returns
+    -------
+    (steps, S) float64 array
+        (T^k)_jj in row k − 1.
+    """
+    powers = [np.eye(len(transition)), transition]
+    for _ in range(2, (steps + 1) // 2 + 1):
+        powers.append(powers[-1] @ transition)
+    # (T^(a+b))_jj = Σ_i (T^a)_ji (T^b)_ij: half the powers are enough.
+    return np.array(
+        [np.einsum("ij,ji->i", powers[(k + 1) // 2], powers[k // 2]) for k in range(1, steps + 1)]
+    )
+
+
 def _arrays(matrix: sparse.csr_array) -> tuple[Ints, Ints, Floats]:
     """A sparse matrix as the kernel takes it, of one type whatever its indices are."""
     return matrix.indptr.astype(np.int64), matrix.indices.astype(np.int64), matrix.data

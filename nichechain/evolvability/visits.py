@@ -9,14 +9,12 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy import sparse
 
 from nichechain.chain.model import NicheChain, Transition
 from nichechain.core.checks import as_floats
 from nichechain.core.errors import NichechainError
 from nichechain.core.randomness import Purpose, keyed
-from nichechain.core.row_sampler import RowSampler
-from nichechain.evolvability.coverage import entries
+from nichechain.evolvability.coverage import simulated_lineages
 from nichechain.evolvability.question import DRAWS, Convention, Question, Root
 from nichechain.niches import Niche
 
@@ -210,24 +208,17 @@ def _walks(
     chain: NicheChain,
 ) -> Iterator[Floats]:
     """Metrics of simulated repeats, (5, r) at a time, in the order of the fields."""
-    onward = RowSampler(entries(transition))
-    begin = RowSampler(sparse.csr_array(first[None, :]))
     centers = _centers(chain)
-    at_once = max(1, _CELLS // max(chain.states, lineages))
-    for done in range(0, repeats, at_once):
-        size = min(at_once, repeats - done)
-        row = np.repeat(np.arange(size), lineages) * chain.states
+    for repeat, walks in simulated_lineages(transition, first, steps, lineages, repeats, rng, _CELLS):
+        size = repeat[-1] + 1
         visits = np.zeros(size * chain.states, np.int64)
-        length = np.zeros(size * lineages)
-        here = begin.draw(np.zeros(size * lineages, np.int64), rng)
-        if start is not None:
-            length += _apart(centers, np.full(here.size, start), here)
-        visits += np.bincount(row + here, minlength=visits.size)
-        for _ in range(steps - 1):
-            after = onward.draw(here, rng)
-            length += _apart(centers, here, after)
-            here = after
-            visits += np.bincount(row + here, minlength=visits.size)
+        length = np.zeros(repeat.size)
+        before = None if start is None else np.full(repeat.size, start)
+        for here in walks:
+            if before is not None:
+                length += _apart(centers, before, here)
+            visits += np.bincount(repeat * chain.states + here, minlength=visits.size)
+            before = here
         counts = visits.reshape(size, chain.states)[:, : chain.n_niches]
         yield np.stack(
             [

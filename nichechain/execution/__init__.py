@@ -5,6 +5,7 @@ from __future__ import annotations
 from contextlib import AbstractContextManager
 
 from nichechain.core.errors import NichechainError
+from nichechain.domains.memory import parse_memory
 from nichechain.execution.base import WORKER_DIED, Executor, available_cpus, evaluate_rows
 from nichechain.execution.processes import Processes
 from nichechain.execution.ray import Ray
@@ -22,7 +23,7 @@ __all__ = [
 ]
 
 
-def make(workers: str | None = None) -> AbstractContextManager[Executor]:
+def make(workers: str | None = None, cache_memory: str | None = None) -> AbstractContextManager[Executor]:
     """The executor of that description, as the command line knows it.
 
     Parameters
@@ -30,6 +31,9 @@ def make(workers: str | None = None) -> AbstractContextManager[Executor]:
     workers : str, optional
         ``4`` or ``threads:4``, ``processes:4``, ``ray`` or ``ray://host:port``; without a number,
         one worker per processor. By default ``threads``.
+    cache_memory : str, optional
+        Memory that caches of a domain may take on each machine, such as ``500MB``, or ``0`` for
+        none; by default as much as the domain says.
 
     Returns
     -------
@@ -39,18 +43,21 @@ def make(workers: str | None = None) -> AbstractContextManager[Executor]:
     Raises
     ------
     NichechainError
-        If there is no such executor, or Ray is asked for and is not installed or does not answer.
+        If there is no such executor, the memory is none, or Ray is asked for and is not installed
+        or does not answer.
     """
+    limit = None if cache_memory is None else parse_memory(cache_memory)
     kind, _, rest = (workers or "threads").partition(":")
     if not rest and _is_number(kind):
         kind, rest = "threads", kind
     if kind == "ray" and workers == "ray":
-        return Ray()
+        return Ray(cache_memory=limit)
     if kind == "ray" and rest.startswith("//") and len(rest) > 2:
-        return Ray(workers)
+        return Ray(workers, cache_memory=limit)
     if kind in ("threads", "processes") and (workers in (None, kind) or _is_number(rest)):
         count = int(rest) if rest else None
-        return Threads(count) if kind == "threads" else Processes(count)
+        kind_of = Threads if kind == "threads" else Processes
+        return kind_of(count, cache_memory=limit)
     raise NichechainError(
         f"workers is {workers!r}, but must be a number of threads, threads:N, processes:N, ray or ray://HOST:PORT"
     )

@@ -11,7 +11,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from nichechain.core.checks import check_whole
+from nichechain.core.checks import check_at_least
 from nichechain.core.errors import NichechainError
 from nichechain.domains.base import Domain, Evaluation
 
@@ -150,7 +150,5 @@ def count_workers(workers: int | None) -> int:
         If it is below 1.
     """
     count = available_cpus() if workers is None else workers
-    check_whole(workers=count)
-    if count < 1:
-        raise NichechainError(f"workers is {count}, but at least 1 is needed")
+    check_at_least(1, workers=count)
     return count

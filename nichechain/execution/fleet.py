@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from nichechain.core.errors import NichechainError
 from nichechain.domains.base import Domain, Evaluation
+from nichechain.domains.memory import cache_memory_of, check_cache_memory, limit_cache
 from nichechain.execution.base import WORKER_DIED, all_failed, evaluate_rows
 from nichechain.execution.pieces import LOSSES, Piece, Pieces
 
@@ -68,16 +69,20 @@ class Workbench:
     ----------
     domain : bytes
         The pickled domain.
+    cache_memory : int
+        Bytes that its cache may take.
     """
 
-    def __init__(self, domain: bytes) -> None:
+    def __init__(self, domain: bytes, cache_memory: int) -> None:
         self._pickled = domain
+        self._cache_memory = cache_memory
         self._domain: Domain | None = None
 
     def prepare(self) -> Raised | None:
         """Unpack the domain; what it raised, if it did."""
         try:
             self._domain = pickle.loads(self._pickled)  # noqa: S301  # from our own driver
+            limit_cache(self._domain, self._cache_memory)
         except Exception as error:
             return Raised.of(error)
         return None
@@ -124,7 +129,11 @@ class Fleet(ABC):
     _lost: tuple[type[BaseException], ...]
     """What a worker's futures raise when it is no more."""
 
-    def __init__(self) -> None:
+    def __init__(self, cache_memory: int | None = None) -> None:
+        if cache_memory is not None:
+            check_cache_memory(cache_memory)
+        self._cache_memory = cache_memory
+        self._cache_share = 0
         self._crew: list[Worker] = []
         self._domain: Domain | None = None
         self._proven = False
@@ -132,6 +141,10 @@ class Fleet(ABC):
     @abstractmethod
     def _size(self) -> int:
         """How many workers there should be now."""
+
+    @abstractmethod
+    def _neighbours(self) -> int:
+        """How many workers share the memory of a machine, at most."""
 
     @abstractmethod
     def _send(self, domain: bytes) -> None:
@@ -160,6 +173,8 @@ class Fleet(ABC):
 
                 self._dismiss(kill=False)
                 self._send(cloudpickle.dumps(domain))
+                memory = cache_memory_of(domain) if self._cache_memory is None else self._cache_memory
+                self._cache_share = memory // self._neighbours()
                 self._domain = domain
                 self._proven = False
             size = self._size()

@@ -30,39 +30,46 @@ class Processes(Fleet):
     ----------
     workers : int
         Number of processes, at least 1; by default the processors this process may use.
+    cache_memory : int, optional
+        Bytes that caches of a domain may take in all processes together; by default as many as the
+        domain says.
 
     Raises
     ------
     NichechainError
-        If ``workers`` is below 1.
+        If ``workers`` is below 1, or ``cache_memory`` is below 0.
     """
 
     _lost = (BrokenProcessPool,)
 
-    def __init__(self, workers: int | None = None) -> None:
-        super().__init__()
+    def __init__(self, workers: int | None = None, *, cache_memory: int | None = None) -> None:
+        super().__init__(cache_memory)
         self._count = count_workers(workers)
         self._pickled = b""
 
     def _size(self) -> int:
         return self._count
 
+    def _neighbours(self) -> int:
+        return self._count
+
     def _send(self, domain: bytes) -> None:
         self._pickled = domain
 
     def _hire(self) -> Worker:
-        return _Process(self._pickled)
+        return _Process(self._pickled, self._cache_share)
 
 
 class _Process(Worker):
     """A pool of one: when it breaks, we know over which rows, and the others go on."""
 
-    def __init__(self, domain: bytes) -> None:
+    def __init__(self, domain: bytes, cache_memory: int) -> None:
         from loky import ProcessPoolExecutor
 
         # As many numerical threads in each process as processors would be too many.
         env = {"OMP_NUM_THREADS": os.environ.get("OMP_NUM_THREADS", "1")}
-        self._pool: Any = ProcessPoolExecutor(1, initializer=_begin, initargs=(domain, os.getpid()), env=env)
+        begun_with = (domain, cache_memory, os.getpid())
+        self._pool: Any = ProcessPoolExecutor(1, initializer=_begin, initargs=begun_with, env=env)
         self.ready = self._pool.submit(_prepare)
 
     def submit(self, genotypes: NDArray[np.float32]) -> Future[Outcome]:
@@ -81,11 +88,11 @@ class _Process(Worker):
 _bench: list[Workbench] = []
 
 
-def _begin(domain: bytes, parent: int) -> None:
+def _begin(domain: bytes, cache_memory: int, parent: int) -> None:
     # Ctrl-C reaches all processes of a terminal; what it means is for the parent to say.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
-    _bench[:] = [Workbench(domain)]
+    _bench[:] = [Workbench(domain, cache_memory)]
 
 
 def _end_with(parent: int) -> None:

@@ -27,15 +27,17 @@ class Ray(Fleet):
         ``ray://host:port`` of a cluster's client server. By default what this process is
         connected to, or else the cluster that RAY_ADDRESS names or that runs on this machine, or
         else one that is started here and ends with the executor.
+    cache_memory : int, optional
+        Bytes that caches of a domain may take on each node; by default as many as the domain says.
 
     Raises
     ------
     NichechainError
-        If Ray is not installed, or no cluster answers at the address.
+        If Ray is not installed, no cluster answers at the address, or ``cache_memory`` is below 0.
     """
 
-    def __init__(self, address: str | None = None) -> None:
-        super().__init__()
+    def __init__(self, address: str | None = None, *, cache_memory: int | None = None) -> None:
+        super().__init__(cache_memory)
         self._ray = _import_ray()
         self._connected_here = address is not None or not self._ray.is_initialized()
         if self._connected_here:
@@ -48,12 +50,16 @@ class Ray(Fleet):
     def _size(self) -> int:
         return max(1, int(self._ray.cluster_resources().get("CPU", 1)))
 
+    def _neighbours(self) -> int:
+        nodes = (node["Resources"].get("CPU", 1) for node in self._ray.nodes() if node["Alive"])
+        return max(1, int(max(nodes, default=1)))
+
     def _send(self, domain: bytes) -> None:
         # Put once, fetched once by each node.
         self._pickled = self._ray.put(domain)
 
     def _hire(self) -> Worker:
-        return _Actor(self._ray, self._actor.remote(self._pickled))
+        return _Actor(self._ray, self._actor.remote(self._pickled, self._cache_share))
 
     def close(self) -> None:
         """End the actors, and the connection if it was made here."""

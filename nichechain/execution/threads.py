@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nichechain.domains.base import Domain, Evaluation
+from nichechain.domains.memory import check_cache_memory, limit_cache
 from nichechain.execution.base import count_workers, evaluate_rows
 
 
@@ -22,14 +23,19 @@ class Threads:
     ----------
     workers : int
         Number of threads, at least 1; by default the processors this process may use.
+    cache_memory : int, optional
+        Bytes that caches of a domain may take on this machine; by default as many as the domain says.
 
     Raises
     ------
     NichechainError
-        If ``workers`` is below 1.
+        If ``workers`` is below 1, or ``cache_memory`` is below 0.
     """
 
-    def __init__(self, workers: int | None = None) -> None:
+    def __init__(self, workers: int | None = None, *, cache_memory: int | None = None) -> None:
+        if cache_memory is not None:
+            check_cache_memory(cache_memory)
+        self._cache_memory = cache_memory
         self._pool = ThreadPoolExecutor(count_workers(workers), thread_name_prefix="nichechain")
 
     def evaluate(
@@ -39,6 +45,8 @@ class Threads:
         on_done: Callable[[int], None] | None = None,
     ) -> Evaluation:
         """Evaluate genotypes (N, P), N at least 1, telling ``on_done`` of every finished chunk's size."""
+        if self._cache_memory is not None:
+            limit_cache(domain, self._cache_memory)
         # Chunks are views, so a long queue of them costs next to nothing.
         futures = [
             self._pool.submit(evaluate_rows, domain, genotypes[first : first + domain.chunk])

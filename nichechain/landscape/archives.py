@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from nichechain.core.checks import as_floats, check_numbers, check_seed, check_whole
+from nichechain.core.checks import as_floats, check_at_least, check_seed, check_share
 from nichechain.core.errors import NichechainError
 from nichechain.core.randomness import Purpose, keyed
 from nichechain.landscape.behaviors import (
@@ -284,13 +284,9 @@ def measure_archive(
     """
     check_sample_size(offspring)
     check_seed(seed)
-    check_numbers(share=share)
+    check_share(share=share)
     if elites is not None:
-        check_whole(elites=elites)
-    if not 0 < share <= 1:
-        raise NichechainError(f"share is {share}, but must be above 0 and at most 1")
-    if elites is not None and elites < 1:
-        raise NichechainError(f"elites is {elites}, but at least 1 is needed")
+        check_at_least(1, elites=elites)
     operator = archive.mutate if mutate is None else mutate
     if not len(archive.elites):
         raise NichechainError(f"{archive.folder} has no elites to measure")

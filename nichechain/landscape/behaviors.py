@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from nichechain.births.table import NONE
 from nichechain.core.arrays import ordered_sum, present
-from nichechain.core.checks import as_floats, as_whole, check_numbers, check_whole
+from nichechain.core.checks import as_floats, as_whole, check_at_least, check_numbers
 from nichechain.core.errors import NichechainError
 
 Floats = NDArray[np.float64]
@@ -159,9 +159,7 @@ def one_hot_evolvability(niche: ArrayLike, niches: int) -> Floats:
         It grows with the sample: report the size beside it.
     """
     state = as_whole("niche", niche)
-    check_whole(niches=niches)
-    if niches < 1:
-        raise NichechainError(f"niches is {niches}, but at least 1 is needed")
+    check_at_least(1, niches=niches)
     if not state.ndim:
         raise NichechainError("niche has shape (), but must be (..., n), one state per offspring")
     ordered = np.sort(np.where((state != NONE) & (state < niches), state, NONE), axis=-1)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from nichechain.core.checks import as_floats, check_numbers
+from nichechain.core.checks import as_floats, check_numbers, check_share
 from nichechain.core.errors import NichechainError
 
 Floats = NDArray[np.float64]
@@ -60,9 +60,8 @@ def find_dissimila(
     NichechainError
         If ``share`` is outside (0, 1], ``neutral`` is negative or the shapes differ.
     """
-    check_numbers(share=share, neutral=neutral)
-    if not 0 < share <= 1:
-        raise NichechainError(f"share is {share}, but must be above 0 and at most 1")
+    check_share(share=share)
+    check_numbers(neutral=neutral)
     if not neutral >= 0:
         raise NichechainError(f"neutral is {neutral}, but must not be negative")
     value, spread = as_floats("ratio", ratio), as_floats("sensitivity", sensitivity)

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from nichechain.births.table import NONE
 from nichechain.core.arrays import present
-from nichechain.core.checks import as_floats, check_whole
+from nichechain.core.checks import as_floats, check_at_least
 from nichechain.core.errors import NichechainError
 from nichechain.landscape.behaviors import (
     EPSILON,
@@ -213,9 +213,7 @@ def check_sample_size(size: int) -> None:
     NichechainError
         If it is below 2.
     """
-    check_whole(sample_size=size)
-    if size < 2:
-        raise NichechainError(f"sample_size is {size}, but evolvability needs at least 2 offspring")
+    check_at_least(2, sample_size=size)
 
 
 def _joined(parts: list[Floats]) -> Floats:

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from nichechain.niches.base import OUTSIDE_MODES, Niche, Niches
+from nichechain.niches.base import OUTSIDE_MODES, Niche, Niches, one_hot
 from nichechain.niches.cvt import CVTNiches
 from nichechain.niches.grid import GridNiches
-from nichechain.niches.one_hot import one_hot
 from nichechain.niches.parsing import parse_bounds, parse_niche, parse_niches, parse_shape
 
 __all__ = [

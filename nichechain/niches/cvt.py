@@ -5,23 +5,22 @@ from __future__ import annotations
 import operator
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from nichechain.core.checks import as_bounds, as_floats, check_whole
+from nichechain.core.checks import as_bounds, as_floats, check_choice, check_whole
 from nichechain.core.errors import NichechainError
 from nichechain.core.randomness import Purpose, keyed
 from nichechain.niches.base import (
     MOST_NICHES,
+    OUTSIDE_MODES,
     Bounds,
     Floats,
     Ints,
     Niche,
+    Niches,
     check_bounds,
-    check_outside,
-    checked_behavior,
     is_inside,
 )
 
@@ -39,7 +38,7 @@ _FARTHEST = 1e150
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class CVTNiches:
+class CVTNiches(Niches):
     """Niches around centroids: a behavior belongs to the nearest one (Vassiliades et al. 2018).
 
     Their number does not depend on the number of axes, where a grid's is exponential in it.
@@ -66,12 +65,12 @@ class CVTNiches:
     bounds: Bounds
     outside: str = "state"
 
-    kind = "cvt"
+    kind: ClassVar[str] = "cvt"
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "bounds", as_bounds(self.bounds))
         check_bounds(self.bounds)
-        check_outside(self.outside)
+        check_choice("outside", self.outside, OUTSIDE_MODES)
         centroids = as_floats("centroids", self.centroids).copy()
         if centroids.ndim != 2 or not centroids.size or centroids.shape[1] != len(self.bounds):
             raise NichechainError(
@@ -133,21 +132,6 @@ class CVTNiches:
         return len(self.centroids)
 
     @property
-    def states(self) -> int:
-        """States of the chain: the niches, and the outside state where there is one."""
-        return len(self) + (self.outside != "clip")
-
-    @property
-    def lower(self) -> Floats:
-        """Lower bound of each axis, (B,)."""
-        return np.array([low for low, _ in self.bounds])
-
-    @property
-    def upper(self) -> Floats:
-        """Upper bound of each axis, (B,)."""
-        return np.array([high for _, high in self.bounds])
-
-    @property
     def centers(self) -> Floats:
         """Centroid of each niche, (n, B), in units of behavior."""
         return self.centroids
@@ -158,29 +142,9 @@ class CVTNiches:
 
         return KDTree(self.centroids)
 
-    def of(self, behavior: ArrayLike) -> Ints:
-        """State that each behavior belongs to.
-
-        Parameters
-        ----------
-        behavior : (N, B) array
-            Finite values.
-
-        Returns
-        -------
-        (N,) int64 array
-            Numbers of niches, ``len(self)`` for the outside state.
-
-        Raises
-        ------
-        NichechainError
-            If the shape does not fit or a value is not finite.
-        """
-        points = checked_behavior(behavior, len(self.bounds))
+    def _nearest(self, points: Floats) -> Ints:
         _, nearest = self._tree.query(np.clip(points, -_FARTHEST, _FARTHEST))
         state: Ints = nearest.astype(np.int64)
-        if self.outside != "clip":
-            state[~is_inside(points, self.bounds)] = len(self)
         return state
 
     def flat(self, niche: Niche) -> int:
@@ -205,10 +169,6 @@ class CVTNiches:
     def index(self, flat: int) -> tuple[int, ...]:
         """The number of a niche as a tuple of one."""
         return (self.flat(flat),)
-
-    def label(self, state: int) -> str:
-        """``"17"`` for a niche, ``"outside"`` for the outside state."""
-        return "outside" if state == len(self) else str(self.flat(state))
 
     def settings(self) -> dict[str, Any]:
         """What the configuration of a build says of these niches, but for their seed."""

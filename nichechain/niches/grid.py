@@ -5,23 +5,14 @@ from __future__ import annotations
 import math
 import operator
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from nichechain.core.checks import as_bounds, as_shape
+from nichechain.core.checks import as_bounds, as_shape, check_choice
 from nichechain.core.errors import NichechainError
-from nichechain.niches.base import (
-    MOST_NICHES,
-    Floats,
-    Ints,
-    Niche,
-    check_bounds,
-    check_outside,
-    checked_behavior,
-    is_inside,
-)
+from nichechain.niches.base import MOST_NICHES, OUTSIDE_MODES, Floats, Ints, Niche, Niches, check_bounds
 
 # pyribs adds this to a scaled coordinate before it rounds down (its default ``epsilon``), and the
 # two must put a behavior in the same cell.
@@ -29,7 +20,7 @@ _EPSILON = 1e-6
 
 
 @dataclass(frozen=True)
-class GridNiches:
+class GridNiches(Niches):
     """Equal cells over a box of behavior space.
 
     Parameters
@@ -53,7 +44,7 @@ class GridNiches:
     bounds: tuple[tuple[float, float], ...]
     outside: str = "state"
 
-    kind = "grid"
+    kind: ClassVar[str] = "grid"
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "shape", as_shape(self.shape))
@@ -67,26 +58,11 @@ class GridNiches:
                 f"grid has {len(self.shape)} axes but bounds have {len(self.bounds)}: one pair per axis"
             )
         check_bounds(self.bounds)
-        check_outside(self.outside)
+        check_choice("outside", self.outside, OUTSIDE_MODES)
 
     def __len__(self) -> int:
         """Number of niches; the outside state is not one."""
         return math.prod(self.shape)
-
-    @property
-    def states(self) -> int:
-        """States of the chain: the niches, and the outside state where there is one."""
-        return len(self) + (self.outside != "clip")
-
-    @property
-    def lower(self) -> Floats:
-        """Lower bound of each axis, (B,)."""
-        return np.array([low for low, _ in self.bounds])
-
-    @property
-    def upper(self) -> Floats:
-        """Upper bound of each axis, (B,)."""
-        return np.array([high for _, high in self.bounds])
 
     @property
     def centers(self) -> Floats:
@@ -95,31 +71,11 @@ class GridNiches:
         centers: Floats = self.lower + (index + 0.5) * (self.upper - self.lower) / np.array(self.shape)
         return centers
 
-    def of(self, behavior: ArrayLike) -> Ints:
-        """State that each behavior belongs to.
-
-        Parameters
-        ----------
-        behavior : (N, B) array
-            Finite values.
-
-        Returns
-        -------
-        (N,) int64 array
-            Flat ids of niches, ``len(self)`` for the outside state.
-
-        Raises
-        ------
-        NichechainError
-            If the shape does not fit or a value is not finite.
-        """
-        points = checked_behavior(behavior, len(self.shape))
+    def _nearest(self, points: Floats) -> Ints:
         shape = np.array(self.shape)
         scaled = (shape * (points - self.lower) + _EPSILON) / (self.upper - self.lower)
         index = np.clip(scaled, 0, shape - 1).astype(np.int64)
         flat: Ints = np.ravel_multi_index(tuple(index.T), self.shape).astype(np.int64)
-        if self.outside != "clip":
-            flat[~is_inside(points, self.bounds)] = len(self)
         return flat
 
     def flat(self, niche: Niche) -> int:
@@ -158,10 +114,6 @@ class GridNiches:
     def settings(self) -> dict[str, Any]:
         """What the configuration of a build says of these niches."""
         return {"niches": self.kind, "shape": self.shape, "bounds": self.bounds, "outside": self.outside}
-
-    def label(self, state: int) -> str:
-        """``"7,11"`` for a niche, ``"outside"`` for the outside state."""
-        return "outside" if state == len(self) else ",".join(map(str, self.index(state)))
 
     def as_grid(self, values: ArrayLike) -> NDArray[Any]:
         """Values of all niches (n,) laid out as the grid."""

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from nichechain.core.checks import check_choice
 from nichechain.core.errors import NichechainError
 from nichechain.core.intervals import mean_interval
 from nichechain.plots.style import FAINT, INK
@@ -276,15 +277,13 @@ def _columns(labels: Sequence[str]) -> int:
 
 
 def _labels(records: pd.DataFrame, measure: str, conditions: Sequence[str] | None) -> list[str]:
-    if measure not in MEASURES:
-        raise NichechainError(f"measure is {measure!r}, but must be one of {', '.join(MEASURES)}")
+    check_choice("measure", measure, MEASURES)
     there = list(dict.fromkeys(records["condition"]))
     if not there:
         raise NichechainError("there are no finished walks to draw")
     labels = there if conditions is None else list(conditions)
     for label in labels:
-        if label not in there:
-            raise NichechainError(f"condition is {label!r}, but must be one of {', '.join(there)}")
+        check_choice("condition", label, there)
     return labels
 
 

@@ -9,11 +9,11 @@ import numpy as np
 import pyarrow as pa
 
 from nichechain.archive.imported import Axes, write_archive
-from nichechain.births.table import NONE, Offspring, table
+from nichechain.births.table import NONE, Offspring, make_table
 from nichechain.core.errors import NichechainError
 from nichechain.domains.base import Evaluation
+from nichechain.niches.ribs import empty_archive, niches_of
 from nichechain.pyribs.recording import Recording
-from nichechain.pyribs.translation import empty_archive, niches_of
 from nichechain.search.elites import Elites, SearchState
 
 if TYPE_CHECKING:
@@ -125,19 +125,8 @@ def _elites(archive: Any, niches: Any, cells: Any, uid: Any, depth: Any) -> Elit
     if niches.outside != "clip":
         inside = ((behavior >= niches.lower) & (behavior <= niches.upper)).all(axis=1)
         state[~inside] = len(niches)
-    # By state, the largest objective first, and of equals the birth that was earlier.
-    order = np.lexsort((uid, -objective, state))
-    order = order[np.diff(state[order], prepend=-1) > 0]
     genotype = data["solution"].reshape(len(state), -1).astype(np.float32)
-    return Elites(
-        state[order],
-        genotype[order],
-        behavior[order],
-        objective[order],
-        objective[order],
-        uid[order],
-        depth[order],
-    )
+    return Elites(state, genotype, behavior, objective, objective, uid, depth).winners()
 
 
 def _as_births(archive: Any, cells: Any) -> pa.Table:
@@ -159,4 +148,4 @@ def _as_births(archive: Any, cells: Any) -> pa.Table:
         np.zeros(size, bool),
         ("",) * size,
     )
-    return table(offspring, evaluation, child_niche=cells, accepted=np.ones(size, bool), step=0)
+    return make_table(offspring, evaluation, child_niche=cells, accepted=np.ones(size, bool), step=0)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from ribs.emitters import EmitterBase
 
-from nichechain.core.checks import as_floats, check_seed, check_whole
+from nichechain.core.checks import as_floats, check_at_least, check_seed
 from nichechain.core.errors import NichechainError
 from nichechain.variation import Mutation
 
@@ -52,11 +52,9 @@ class MutationEmitter(EmitterBase):
             raise NichechainError(
                 f"initial solutions have shape {initial.shape}, but must be (n, {archive.solution_dim})"
             )
-        check_whole(batch_size=batch_size)
+        check_at_least(1, batch_size=batch_size)
         if seed is not None:
             check_seed(seed)
-        if batch_size < 1:
-            raise NichechainError(f"batch_size is {batch_size}, but must be at least 1")
         self.batch_size = batch_size
         self._initial = initial
         self._mutate = mutate

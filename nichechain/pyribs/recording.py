@@ -13,11 +13,12 @@ from numpy.typing import NDArray
 
 from nichechain import births
 from nichechain.births.table import NONE, Offspring
+from nichechain.core.checks import check_choice
 from nichechain.core.errors import NichechainError
 from nichechain.domains.base import Evaluation
 from nichechain.niches import Niches
+from nichechain.niches.ribs import niches_of
 from nichechain.pyribs.strategies import StrategyParent, centre, is_strategy
-from nichechain.pyribs.translation import niches_of
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -99,15 +100,8 @@ class Recording:
         outside: Outside = "state",
         strategy_parent: StrategyConvention = "mean",
     ) -> None:
-        if outside not in get_args(Outside):
-            raise NichechainError(
-                f"outside is {outside!r}, but must be one of {', '.join(get_args(Outside))}"
-            )
-        if strategy_parent not in get_args(StrategyConvention):
-            raise NichechainError(
-                f"strategy_parent is {strategy_parent!r}, "
-                f"but must be one of {', '.join(get_args(StrategyConvention))}"
-            )
+        check_choice("outside", outside, get_args(Outside))
+        check_choice("strategy_parent", strategy_parent, get_args(StrategyConvention))
         if isinstance(getattr(archive.__dict__.get("add"), "__self__", None), Recording):
             raise NichechainError("the archive is being recorded already: use that recording")
         self.niches: Niches = niches_of(archive, outside)
@@ -327,7 +321,7 @@ class Recording:
         )
         accepted = _one_by_one(cell, objective, entered)
         self._tables.append(
-            births.table(offspring, evaluation, child_niche=state, accepted=accepted, step=self._step)
+            births.make_table(offspring, evaluation, child_niche=state, accepted=accepted, step=self._step)
         )
 
     def _states(self, measures: NDArray[Any], cell: Ints) -> Ints:
@@ -377,11 +371,6 @@ def _are_batch(solution: NDArray[Any], objective: NDArray[Any], measures: NDArra
     numbers = all(np.issubdtype(values.dtype, np.number) for values in (objective, measures))
     shaped = solution.ndim >= 1 and objective.ndim == 1 and measures.ndim == 2
     return numbers and shaped and len(solution) == len(objective) == len(measures)
-
-
-def _check_choice(name: str, value: str, allowed: tuple[str, ...]) -> None:
-    if value not in allowed:
-        raise NichechainError(f"{name} is {value!r}, but must be one of {', '.join(allowed)}")
 
 
 def _one_by_one(cell: Ints, objective: NDArray[Any], entered: NDArray[np.bool_]) -> NDArray[np.bool_]:

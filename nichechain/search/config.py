@@ -7,7 +7,16 @@ from collections.abc import Mapping
 from dataclasses import MISSING, asdict, dataclass, field, fields
 from typing import Any, Literal, get_args
 
-from nichechain.core.checks import DomainOption, StepBound, as_bounds, as_shape, check_numbers, plain_options
+from nichechain.core.checks import (
+    DomainOption,
+    StepBound,
+    as_bounds,
+    as_shape,
+    check_at_least,
+    check_choice,
+    check_numbers,
+    plain_options,
+)
 from nichechain.core.errors import NichechainError
 
 Replacement = Literal["random", "first", "newest", "objective"]
@@ -133,39 +142,23 @@ class BuildConfig:
             kind, size = self.step_bound
             check_numbers(step_bound=size)
             object.__setattr__(self, "step_bound", (kind, float(size)))
-        for name in ("evaluations", "initial", "batch"):
-            if getattr(self, name) < 1:
-                raise NichechainError(f"{name} is {getattr(self, name)}, but must be at least 1")
-        for name in ("seed", "domain_seed", "niches_seed"):
-            if getattr(self, name) < 0:
-                raise NichechainError(f"{name} is {getattr(self, name)}, but must not be negative")
+        check_at_least(1, evaluations=self.evaluations, initial=self.initial, batch=self.batch)
+        check_at_least(0, seed=self.seed, domain_seed=self.domain_seed, niches_seed=self.niches_seed)
         check_numbers(lineage_share=self.lineage_share)
         object.__setattr__(self, "lineage_share", float(self.lineage_share))
         if not 0 <= self.lineage_share < 1:
             raise NichechainError(
                 f"lineage_share is {self.lineage_share:g}, but must be a share of births, from 0 to below 1"
             )
-        if self.lineage_length < 2:
-            raise NichechainError(
-                f"lineage_length is {self.lineage_length}, but must be at least 2: the first birth "
-                "of a lineage is the child of an elite"
-            )
-        if self.replacement not in get_args(Replacement):
-            raise NichechainError(
-                f"replacement is {self.replacement!r}, but must be one of {', '.join(get_args(Replacement))}"
-            )
-        if self.niches not in get_args(NichesKind):
-            raise NichechainError(
-                f"niches is {self.niches!r}, but must be one of {', '.join(get_args(NichesKind))}"
-            )
+        # The first birth of a lineage is the child of an elite.
+        check_at_least(2, lineage_length=self.lineage_length)
+        check_choice("replacement", self.replacement, get_args(Replacement))
+        check_choice("niches", self.niches, get_args(NichesKind))
         if self.niches == "cvt" and len(self.shape) != 1:
             raise NichechainError(
                 f"shape is {self.shape}, but a tessellation has one number of niches, such as (400,)"
             )
-        if self.selection not in get_args(Selection):
-            raise NichechainError(
-                f"selection is {self.selection!r}, but must be one of {', '.join(get_args(Selection))}"
-            )
+        check_choice("selection", self.selection, get_args(Selection))
 
     def to_json(self) -> dict[str, Any]:
         """Plain values for JSON."""

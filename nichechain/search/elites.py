@@ -7,20 +7,20 @@ the set of births, in whatever order they came.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from nichechain.births.table import Offspring
-from nichechain.core.errors import NichechainError
+from nichechain.core.columns import Columnar
 from nichechain.domains.base import Domain
-from nichechain.niches import CVTNiches, GridNiches, Niches
-from nichechain.search.lineages import Lineages
+from nichechain.niches import Niches
+from nichechain.niches.ribs import empty_archive
+from nichechain.search.lineages import UnderWay
 
 
 @dataclass(frozen=True)
-class Elites:
+class Elites(Columnar):
     """The elites of the occupied states, sorted by state; the outside elite comes last.
 
     Parameters
@@ -42,17 +42,10 @@ class Elites:
     uid: NDArray[np.int64]
     depth: NDArray[np.int64]
 
-    def __len__(self) -> int:
-        return len(self.niche)
-
-    def __getitem__(self, rows: NDArray[np.bool_] | NDArray[np.int64]) -> Elites:
-        return Elites(*(getattr(self, name)[rows] for name in self.__dataclass_fields__))
-
-    @staticmethod
-    def concatenate(first: Elites, second: Elites) -> Elites:
-        """The rows of both."""
-        names = Elites.__dataclass_fields__
-        return Elites(*(np.concatenate([getattr(first, k), getattr(second, k)]) for k in names))
+    def winners(self) -> Elites:
+        """Of every state, the one with the largest key; of equal keys, the one with the smallest uid."""
+        ordered = self[np.lexsort((self.uid, -self.key, self.niche))]
+        return ordered[np.flatnonzero(np.diff(ordered.niche, prepend=-1))]
 
 
 @dataclass(frozen=True)
@@ -69,7 +62,7 @@ class SearchState:
         Births so far.
     step : int
         The last step begun, 0 for the initial births; -1 before them.
-    lineages : Lineages
+    lineages : UnderWay
         Those under way.
     """
 
@@ -77,13 +70,13 @@ class SearchState:
     pending: Offspring
     births: int
     step: int
-    lineages: Lineages
+    lineages: UnderWay
 
     @classmethod
     def at_rest(cls, elites: Elites, births: int, step: int) -> SearchState:
         """A state of a search that has nothing under way."""
         length = elites.genotype.shape[1]
-        return cls(elites, Offspring.none(length), births, step, Lineages.none(length))
+        return cls(elites, Offspring.none(length), births, step, UnderWay.none(length))
 
 
 class EliteArchive:
@@ -91,11 +84,9 @@ class EliteArchive:
 
     def __init__(self, domain: Domain, niches: Niches) -> None:
         self._niches = niches
-        make, cells = _pyribs(niches)
-        self._grid = make(
+        self._grid = empty_archive(
+            niches,
             solution_dim=domain.genotype_length,
-            ranges=niches.bounds,
-            **cells,
             solution_dtype=np.float32,
             objective_dtype=np.float64,
             measures_dtype=np.float64,
@@ -130,7 +121,7 @@ class EliteArchive:
             )
         outside = candidates[candidates.niche == len(self._niches)]
         if self._outside is not None:
-            outside = Elites.concatenate(self._outside, outside)
+            outside = Elites.concatenate([self._outside, outside])
         if len(outside):
             # argmax takes the first of equals, as pyribs does: the elite that is there stays.
             self._outside = outside[np.array([np.argmax(outside.key)])]
@@ -165,18 +156,4 @@ class EliteArchive:
         # Row len(found) stands for the outside elite.
         rows = np.full(len(state), len(found))
         rows[inside] = np.arange(len(found))
-        return Elites.concatenate(found, self._outside)[rows]
-
-
-def _pyribs(niches: Niches) -> tuple[Any, dict[str, Any]]:
-    """The class of archive that has such niches, and what it has to be told of them."""
-    # Importing pyribs takes seconds, which only a search should spend.
-    from ribs.archives import CVTArchive, GridArchive
-
-    match niches:
-        case GridNiches():
-            return GridArchive, {"dims": niches.shape}
-        case CVTNiches():
-            return CVTArchive, {"centroids": niches.centroids}
-        case _:
-            raise NichechainError(f"niches are {niches!r}, but pyribs has an archive for grid and cvt only")
+        return Elites.concatenate([found, self._outside])[rows]

@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nichechain.births.table import NONE
+from nichechain.core.columns import Columnar
 from nichechain.search.config import BuildConfig
 
 Ints = NDArray[np.int64]
@@ -31,7 +32,7 @@ _DIGITS = 9
 
 
 @dataclass(frozen=True)
-class Lineages:
+class UnderWay(Columnar):
     """The latest birth of each lineage under way.
 
     Parameters
@@ -49,13 +50,10 @@ class Lineages:
     depth: Ints
 
     @classmethod
-    def none(cls, length: int) -> Lineages:
+    def none(cls, length: int) -> UnderWay:
         """No lineage, of genotypes of that length."""
         none = np.empty(0, np.int64)
         return cls(none, np.empty((0, length), np.float32), none, none, none)
-
-    def __len__(self) -> int:
-        return len(self.slot)
 
     def rows(self, slot: Ints) -> Ints:
         """Row of each of some slots, ``NONE`` where no lineage is under way."""
@@ -64,15 +62,11 @@ class Lineages:
         at = np.minimum(np.searchsorted(self.slot, slot), len(self) - 1)
         return np.where(self.slot[at] == slot, at, NONE)
 
-    def after(self, births: Lineages, ended: Ints) -> Lineages:
+    def after(self, births: UnderWay, ended: Ints) -> UnderWay:
         """The lineages after these births in their slots, and after those in ``ended`` came to nothing."""
         kept = ~np.isin(self.slot, np.concatenate([births.slot, ended]))
-        both = [
-            np.concatenate([getattr(self, name)[kept], getattr(births, name)])
-            for name in self.__dataclass_fields__
-        ]
-        order = np.argsort(both[0])
-        return Lineages(*(array[order] for array in both))
+        both = UnderWay.concatenate([self[kept], births])
+        return both[np.argsort(both.slot)]
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from nichechain.niches import CVTNiches, GridNiches, Niches
 from nichechain.niches.base import Floats
 from nichechain.search.config import BuildConfig
 from nichechain.variation import AdditiveMutation, Bound, Mutation, SelfAdaptiveDomain, SelfAdaptiveMutation
-from nichechain.variation.layers import layers_of
+from nichechain.variation.additive import layers_of
 
 
 def make_domain(config: BuildConfig) -> Domain:

@@ -24,8 +24,9 @@ from nichechain.execution import Executor
 from nichechain.niches import Niches
 from nichechain.search.config import BuildConfig
 from nichechain.search.elites import EliteArchive, Elites, SearchState
-from nichechain.search.lineages import Lineages, Stretch
+from nichechain.search.lineages import Stretch, UnderWay
 from nichechain.search.parents import CuriosityScores, draw_curious
+from nichechain.search.savings import Savings
 from nichechain.variation import Mutation
 
 
@@ -51,6 +52,8 @@ class MapElites:
         Births so far.
     step : int
         The last step begun, -1 before the first.
+    savings : Savings
+        How much physics the births so far were spared, as far as they were evaluated here.
     settled : bool
         Whether the state is that after a finished batch, not in the middle of keeping one.
 
@@ -80,9 +83,10 @@ class MapElites:
         self._stretch = stretch or Stretch.of_build(config)
         self._archive = EliteArchive(domain, niches)
         self._pending = Offspring.none(domain.genotype_length)
-        self._lineages = Lineages.none(domain.genotype_length)
+        self._lineages = UnderWay.none(domain.genotype_length)
         self.births = 0
         self.step = -1
+        self.savings = Savings()
         self.settled = True
         if state is not None:
             self._archive.add(state.elites)
@@ -138,6 +142,7 @@ class MapElites:
         self._pending = waiting[limit:]
         self.step = step
         self.births += len(offspring)
+        self.savings = self.savings.and_of(evaluation)
         rows = self._keep(offspring, evaluation)
         self.settled = True
         return rows
@@ -210,9 +215,9 @@ class MapElites:
         self._lineages = self._gone_on(offspring, niche)
         if self._config.selection == "curiosity":
             self._curiosity.tell(offspring.parent_uid, accepted)
-        return births.table(offspring, evaluation, child_niche=niche, accepted=accepted, step=self.step)
+        return births.make_table(offspring, evaluation, child_niche=niche, accepted=accepted, step=self.step)
 
-    def _gone_on(self, offspring: Offspring, niche: NDArray[np.int64]) -> Lineages:
+    def _gone_on(self, offspring: Offspring, niche: NDArray[np.int64]) -> UnderWay:
         """The lineages after some births of a step."""
         if self.step == 0:
             return self._lineages
@@ -221,7 +226,7 @@ class MapElites:
         if self._niches.outside == "absorb":
             can &= niche < len(self._niches)
         ours, ended = (slot != NONE) & can, (slot != NONE) & ~can
-        births = Lineages(
+        births = UnderWay(
             slot[ours], offspring.genotype[ours], offspring.uid[ours], niche[ours], offspring.depth[ours]
         )
         return self._lineages.after(births, slot[ended])

@@ -23,7 +23,8 @@ import pandas as pd
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from nichechain.births.table import NONE
+from nichechain.births.table import NONE, check_columns
+from nichechain.core.checks import check_choice
 from nichechain.core.errors import NichechainError
 
 Floats = NDArray[np.float64]
@@ -111,11 +112,8 @@ def curiosity(births: pd.DataFrame, by: Literal["elite", "niche"] = "elite") -> 
         If the births do not say who was accepted, or by elite who the parents were.
     """
     keys = {"elite": ["run", "parent_uid", "parent_niche"], "niche": ["parent_niche"]}
-    if by not in keys:
-        raise NichechainError(f"by is {by!r}, but must be elite or niche")
-    missing = [name for name in (*keys[by], "accepted", "parent_uid") if name not in births]
-    if missing:
-        raise NichechainError(f"births have no column {missing[0]}, but need it for curiosity scores")
+    check_choice("by", by, keys)
+    check_columns(births, *keys[by], "accepted", "parent_uid")
     children = births[births["parent_niche"].notna()]
     for name, meaning in (("accepted", "which children entered the archive"), ("parent_uid", "who had them")):
         if children[name].isna().any() and (name == "accepted" or by == "elite"):

@@ -8,11 +8,12 @@ from dataclasses import dataclass
 from typing import Literal, get_args
 
 from nichechain import variation
+from nichechain.core.checks import check_choice
 from nichechain.core.errors import NichechainError
 from nichechain.core.randomness import Purpose, keyed
 from nichechain.studies.initialisation import check_scheme
 from nichechain.variation import Mutation
-from nichechain.variation.parsing import parse_step_bound
+from nichechain.variation.additive import parse_step_bound
 from nichechain.walks import (
     BetterThanParent,
     Selection,
@@ -90,12 +91,8 @@ class Condition:
     initialisation: str = "domain"
 
     def __post_init__(self) -> None:
-        if self.metric not in get_args(MetricName):
-            raise NichechainError(
-                f"metric is {self.metric!r}, but must be one of {', '.join(get_args(MetricName))}"
-            )
-        if self.mode not in get_args(Mode):
-            raise NichechainError(f"mode is {self.mode!r}, but must be one of {', '.join(get_args(Mode))}")
+        check_choice("metric", self.metric, get_args(MetricName))
+        check_choice("mode", self.mode, get_args(Mode))
         if not self.slug:
             raise NichechainError(f"label is {self.label!r}, but must have a letter or a digit")
         check_scheme(self.initialisation)

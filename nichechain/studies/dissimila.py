@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from nichechain.core.checks import check_at_least
 from nichechain.core.errors import NichechainError
 from nichechain.landscape import dissimila_ratio, find_dissimila
 from nichechain.studies.results import HypothesisTest
@@ -121,8 +122,7 @@ def study_dissimila(
     NichechainError
         If the horizon is below 1.
     """
-    if horizon < 1:
-        raise NichechainError(f"horizon is {horizon}, but must be at least 1 step")
+    check_at_least(1, horizon=horizon)
     correlations: dict[str, dict[str, list[float]]] = {label: {} for label in conditions}
     quantiles: dict[str, tuple[float, ...]] = {}
     neutral = left_out = 0

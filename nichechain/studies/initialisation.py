@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from nichechain.core.checks import check_sample, rng_of
+from nichechain.core.checks import check_at_least, rng_of
 from nichechain.core.errors import NichechainError
 from nichechain.domains.base import Domain
 from nichechain.domains.policies.controllers import MLP
@@ -50,7 +50,7 @@ def initialise(domain: Domain, scheme: str, n: int, *, seed: int | np.random.Gen
         If there is no such scheme, or the domain's genotypes are no network's weights.
     """
     factor = check_scheme(scheme)
-    check_sample(n)
+    check_at_least(0, n=n)
     rng = rng_of(seed)
     shape = (n, domain.genotype_length)
     kind, _, rest = scheme.partition(":")

@@ -24,8 +24,7 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from nichechain.core.errors import ArchiveError, NichechainError
-from nichechain.core.files import write_atomically
-from nichechain.core.locking import writing
+from nichechain.core.files import write_atomically, writing
 from nichechain.core.machine import library_versions
 from nichechain.core.randomness import Purpose, keyed
 from nichechain.domains.base import Domain

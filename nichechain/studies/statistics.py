@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from nichechain.core.checks import as_floats, check_whole
+from nichechain.core.checks import as_floats, check_at_least
 from nichechain.core.errors import NichechainError
 from nichechain.core.intervals import LEVEL
 from nichechain.core.randomness import Purpose, keyed
@@ -310,9 +310,7 @@ def _interval(
     """BCa bootstrap interval, or the percentile interval where BCa is undefined."""
     from scipy import stats
 
-    check_whole(resamples=resamples)
-    if resamples < 1:
-        raise NichechainError(f"resamples is {resamples}, but must be at least 1")
+    check_at_least(1, resamples=resamples)
     # A level with one run cannot be jackknifed, and a bootstrap would repeat that run for ever.
     if min(map(len, samples)) < 2:
         return None

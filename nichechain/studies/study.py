@@ -7,7 +7,7 @@ from dataclasses import MISSING, asdict, dataclass, field, fields, replace
 from typing import Any, Literal, get_args
 
 from nichechain import domains
-from nichechain.core.checks import DomainOption, check_whole, plain_options
+from nichechain.core.checks import DomainOption, check_at_least, check_choice, plain_options
 from nichechain.core.errors import NichechainError
 from nichechain.domains.base import Domain
 from nichechain.niches import GridNiches
@@ -88,14 +88,9 @@ class Study:
     domain_options: Mapping[str, DomainOption] = field(default_factory=dict, hash=False)
 
     def __post_init__(self) -> None:
-        if self.kind not in get_args(Kind):
-            raise NichechainError(f"kind is {self.kind!r}, but must be one of {', '.join(get_args(Kind))}")
-        check_whole(runs=self.runs, steps=self.steps, seed=self.seed, domain_seed=self.domain_seed)
-        if self.runs < 1:
-            raise NichechainError(f"runs is {self.runs}, but must be at least 1")
-        for name in ("steps", "seed", "domain_seed"):
-            if getattr(self, name) < 0:
-                raise NichechainError(f"{name} is {getattr(self, name)}, but must not be negative")
+        check_choice("kind", self.kind, get_args(Kind))
+        check_at_least(1, runs=self.runs)
+        check_at_least(0, steps=self.steps, seed=self.seed, domain_seed=self.domain_seed)
         slugs = [condition.slug for condition in self.conditions]
         if not slugs:
             raise NichechainError("a study needs at least 1 condition, but has none")
@@ -172,8 +167,7 @@ def variations(name: str, base: Condition) -> tuple[Condition, ...]:
     NichechainError
         If there is no such study.
     """
-    if name not in VARIATIONS:
-        raise NichechainError(f"study is {name!r}, but must be one of {', '.join(VARIATIONS)}")
+    check_choice("study", name, VARIATIONS)
     if name in _KDE:
         base = replace(base, metric="kde")
     ((varied, values),) = VARIATIONS[name].items()

@@ -11,6 +11,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 from scipy import stats
 
+from nichechain.births.joins import across_runs
 from nichechain.births.table import NONE, check_columns
 from nichechain.chain.base_measure import BaseMeasure
 from nichechain.chain.counts import TransitionCounts
@@ -32,7 +33,7 @@ _VALUE_DRAWS = 50
 
 
 @dataclass(frozen=True)
-class Difference:
+class ContrastRow:
     """One figure of two archives.
 
     Parameters
@@ -63,7 +64,7 @@ class Contrast:
 
     Parameters
     ----------
-    rows : tuple of Difference
+    rows : tuple of ContrastRow
         ``evolvability``: niches that U lineages reach, ``reach``: niches that one lineage does,
         both as means over the niches compared; ``coverage``: niches filled by as many births as
         the smaller archive has.
@@ -76,7 +77,7 @@ class Contrast:
     l, lineages, min_births, resamples : int
     """
 
-    rows: tuple[Difference, ...]
+    rows: tuple[ContrastRow, ...]
     niches: int
     clusters: tuple[tuple[str, int], tuple[str, int]]
     births: int
@@ -86,7 +87,7 @@ class Contrast:
     resamples: int
 
     def to_frame(self) -> pd.DataFrame:
-        """One row per figure, with the fields of :class:`Difference`."""
+        """One row per figure, with the fields of :class:`ContrastRow`."""
         return pd.DataFrame([asdict(row) for row in self.rows])
 
 
@@ -185,7 +186,7 @@ def contrast(
     error = np.sqrt(spreads[0] + spreads[1])
     quantile = float(stats.t.ppf(0.5 + _LEVEL / 2, max(1, min(freedom))))
     rows = tuple(
-        Difference(
+        ContrastRow(
             name, float(a), float(b), float(d), float(e), float(d - quantile * e), float(d + quantile * e)
         )
         for name, a, b, d, e in zip(
@@ -226,10 +227,9 @@ class _Side:
             for name in ("parent_niche", "child_niche", "parent_uid", "run")
         )
         parent, child, uid, run = (column[child != NONE] for column in (parent, child, uid, run))
-        span = 1 + uid.max(initial=0)
+        (elite,) = across_runs(run, uid)
         # A birth of a parent that is not known is a cluster, and an elite, of its own.
-        lonely = span * (1 + run.max(initial=0)) + np.arange(uid.size)
-        elite = np.where(uid == NONE, lonely, run * span + uid)
+        elite = np.where(elite == NONE, elite.max(initial=NONE) + 1 + np.arange(elite.size), elite)
         names, by_run = np.unique(run, return_inverse=True)
         if names.size > 1:
             return cls(niches, parent, child, elite, by_run.ravel().astype(np.int64), "runs", names.size)

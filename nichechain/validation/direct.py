@@ -18,12 +18,13 @@ from scipy import stats
 from nichechain.births.table import NONE
 from nichechain.chain.model import NicheChain
 from nichechain.core.randomness import Purpose, keyed
+from nichechain.core.row_sampler import RowSampler
 from nichechain.evolvability.coverage import expected_coverage, rarefied_coverage
 from nichechain.evolvability.genotypes import draw_children
 from nichechain.evolvability.question import Question
 from nichechain.niches import Niches
 from nichechain.validation.rollouts import Lineages, niches_reached
-from nichechain.validation.simulate import RowSampler, simulate_lineages
+from nichechain.validation.simulate import simulate_lineages
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -188,7 +189,7 @@ def compare(
             )
         )
         rng = keyed(seed, Purpose.PREDICTION, number)
-        begin = RowSampler(first)(np.tile(np.repeat(np.arange(2 * roots), size), _REPLICAS), rng)
+        begin = RowSampler(first).draw(np.tile(np.repeat(np.arange(2 * roots), size), _REPLICAS), rng)
         walks = simulate_lineages(matrix, begin.reshape(-1, size), generations, rng)
         simulated.append(niches_reached(walks, n).reshape(_REPLICAS, 2 * roots, generations))
     value = np.mean(values, axis=0)

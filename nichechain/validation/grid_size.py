@@ -16,6 +16,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from nichechain.births.joins import parent_rows
 from nichechain.births.table import NONE
 from nichechain.chain import NicheChain, TransitionCounts, estimate
 from nichechain.chain.families import counts_of_families, families_of
@@ -280,17 +281,10 @@ def _pairs(archive: Archive) -> tuple[Floats, Floats, Ints]:
         raise NichechainError(f"{archive.folder} has births without behavior, which cannot be binned again")
     if births["parent_uid"].isna().all():
         raise NichechainError(f"{archive.folder} has births that do not say who their parents are")
-    key = births["run"].to_numpy(np.int64), births["uid"].to_numpy(np.int64)
-    row = pd.Series(np.arange(len(births)), index=pd.MultiIndex.from_arrays(key))
-    mother = births["parent_uid"].fillna(NONE).to_numpy(np.int64)
-    born = mother != NONE
-    at = row.reindex(pd.MultiIndex.from_arrays([key[0][born], mother[born]])).to_numpy(np.float64)
-    if np.isnan(at).any():
-        raise NichechainError(f"{archive.folder} has parents that are not among its births")
-    parents = np.full_like(behavior, np.nan)
-    parents[born] = behavior[at.astype(np.int64)]
-    elite = np.full(len(births), NONE, np.int64)
-    elite[born] = at.astype(np.int64)
+    elite = parent_rows(
+        *(births[name].fillna(NONE).to_numpy(np.int64) for name in ("run", "uid", "parent_uid"))
+    )
+    parents = np.where(elite[:, None] == NONE, np.nan, behavior[elite])
     fine = np.isfinite(behavior).all(axis=1)
     return parents[fine], behavior[fine], elite[fine]
 

@@ -20,7 +20,7 @@ from nichechain.chain.estimators import Unvisited, estimate
 from nichechain.chain.families import counts_of_families, families_of
 from nichechain.chain.model import NicheChain
 from nichechain.chain.posterior import DirichletPosterior
-from nichechain.core.checks import check_whole
+from nichechain.core.checks import check_at_least
 from nichechain.core.errors import NichechainError
 from nichechain.core.randomness import Purpose, keyed
 
@@ -111,9 +111,7 @@ def compare_estimators(counts: TransitionCounts, *, folds: int = 5, seed: int = 
     A log-likelihood on the births that are not impossible flatters an estimator that rules out
     many; ``difference`` compares it with the default on just these.
     """
-    check_whole(folds=folds)
-    if folds < 2:
-        raise NichechainError(f"folds is {folds}, but at least 2 are needed")
+    check_at_least(2, folds=folds)
     families = families_of(counts)
     _, elite = np.unique(families[:, :2], axis=0, return_inverse=True)
     elite = elite.ravel()

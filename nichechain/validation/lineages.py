@@ -8,8 +8,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from nichechain.births.table import NONE
-from nichechain.core.errors import NichechainError
+from nichechain.births.joins import across_runs, parent_rows
+from nichechain.births.table import NONE, check_columns
 
 Ints = NDArray[np.int64]
 
@@ -58,26 +58,16 @@ class Triples:
         NichechainError
             If a column is missing, or the birth of a parent is.
         """
-        missing = [name for name in _COLUMNS if name not in births.columns]
-        if missing:
-            raise NichechainError(f"births have no column {missing[0]}, which lineages are joined by")
+        check_columns(births, *_COLUMNS)
         run, uid, parent, depth, parent_niche, child_niche, step = (
             births[name].fillna(NONE).to_numpy(np.int64) for name in _COLUMNS
         )
-        # One number for a birth of all runs.
-        span = 1 + max(uid.max(initial=0), parent.max(initial=0))
-        birth = run * span + uid
-        order = np.argsort(birth)
+        row = parent_rows(run, uid, parent)
+        (number,) = across_runs(run, parent)
         rows = np.flatnonzero((parent != NONE) & (child_niche != NONE))
-        wanted = run[rows] * span + parent[rows]
-        parents, elite = np.unique(wanted, return_inverse=True)
-        at = np.minimum(np.searchsorted(birth, parents, sorter=order), max(0, birth.size - 1))
-        own = order[at] if birth.size else at
-        lost = np.flatnonzero(birth[own] != parents)
-        if lost.size:
-            raise NichechainError(
-                f"birth {parents[lost[0]] % span} is the parent of another, but is not among the births"
-            )
+        # Parents by their numbers, so that it does not matter how births are ordered.
+        _, first, elite = np.unique(number[rows], return_index=True, return_inverse=True)
+        own = row[rows][first]
         return cls(
             elite.astype(np.int64),
             child_niche[rows],

@@ -15,8 +15,7 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from nichechain.core.checks import check_whole
-from nichechain.core.errors import NichechainError
+from nichechain.core.checks import check_at_least
 from nichechain.core.randomness import Purpose, keyed
 from nichechain.validation.lineages import Triples
 
@@ -94,9 +93,7 @@ def lineage_test(
     NichechainError
         If a number is out of range.
     """
-    check_whole(depth_bins=depth_bins)
-    if depth_bins < 1:
-        raise NichechainError(f"depth bins are {depth_bins}, but at least 1 is needed")
+    check_at_least(1, depth_bins=depth_bins)
     known = triples.with_grandparent
     cuts = np.quantile(known.depth, np.arange(1, depth_bins) / depth_bins) if len(known) else np.empty(0)
     stratum = known.niche * depth_bins + np.searchsorted(cuts, known.depth)
@@ -279,9 +276,7 @@ def p_value(observed: float, permuted: Floats) -> float:
 
 def check_permutations(permutations: int) -> None:
     """Refuse a permutation test without permutations."""
-    check_whole(permutations=permutations)
-    if permutations < 1:
-        raise NichechainError(f"permutations are {permutations}, but at least 1 is needed")
+    check_at_least(1, permutations=permutations)
 
 
 def _xlogx(n: Ints | Floats) -> Floats:

@@ -8,8 +8,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from nichechain.births.table import NONE
 from nichechain.chain.model import Matrix, NicheChain
-from nichechain.core.checks import as_whole, check_numbers, check_whole
+from nichechain.core.checks import as_whole, check_at_least, check_numbers, check_whole
 from nichechain.core.errors import NichechainError
+from nichechain.core.row_sampler import RowSampler
 from nichechain.evolvability.coverage import entries
 
 Ints = NDArray[np.int64]
@@ -65,7 +66,7 @@ def simulate_births(
         )
     if not 0.0 <= memory <= 1.0:
         raise NichechainError(f"memory is {memory}, but must be a probability")
-    draw = RowSampler(chain.T)
+    sampler = RowSampler(entries(chain.T))
     columns = {
         name: np.full(births, NONE, np.int64) for name in ("parent_uid", "parent_niche", "child_niche")
     }
@@ -82,7 +83,7 @@ def simulate_births(
             parent_niche[here] = occupied[rng.integers(occupied.size, size=size)]
             parent[here] = elite[parent_niche[here]]
             depth[here] = depth[parent[here]] + 1
-            niche[here] = draw(parent_niche[here], rng)
+            niche[here] = sampler.draw(parent_niche[here], rng)
             before = parent_niche[parent[here]]
             back = (rng.random(size) < memory) & (before != NONE)
             niche[here] = np.where(back, before, niche[here])
@@ -124,46 +125,12 @@ def simulate_lineages(matrix: Matrix, first: ArrayLike, generations: int, rng: n
     NichechainError
         If ``generations`` is below 1.
     """
-    check_whole(l=generations)
-    if generations < 1:
-        raise NichechainError(f"l is {generations}, but a lineage has at least 1 generation")
-    draw = RowSampler(matrix)
+    check_at_least(1, generations=generations)
     here = as_whole("first", first)
     if here.size and not 0 <= here.min() <= here.max() < matrix.shape[0]:
         raise NichechainError(f"first is {here.tolist()}, but must be states from 0 to {matrix.shape[0] - 1}")
-    states = [here]
-    for _ in range(generations - 1):
-        here = draw(here.ravel(), rng).reshape(here.shape)
-        states.append(here)
-    return np.stack(states, axis=-1)
-
-
-class RowSampler:
-    """Draws states from the rows of a matrix.
-
-    Parameters
-    ----------
-    matrix : (m, S) row-stochastic array or sparse matrix
-    """
-
-    def __init__(self, matrix: Matrix) -> None:
-        rows = entries(matrix).copy()
-        rows.eliminate_zeros()
-        sizes = np.diff(rows.indptr)
-        of = np.repeat(np.arange(rows.shape[0]), sizes)
-        total = np.concatenate([[0.0], np.cumsum(rows.data)])
-        within = total[1:] - total[rows.indptr[:-1]][of]
-        # Row i fills the interval from i to i + 1, so that one search serves all rows.
-        self._upper = of + np.minimum(within / within[rows.indptr[1:] - 1][of], 1.0)
-        self._columns = rows.indices.astype(np.int64)
-        self._last = rows.indptr[1:] - 1
-
-    def __call__(self, rows: Ints, rng: np.random.Generator) -> Ints:
-        """One state for each of the rows (N,)."""
-        found = np.searchsorted(self._upper, rows + rng.random(rows.size), side="right")
-        # The sum can round up to the next row.
-        drawn: Ints = self._columns[np.minimum(found, self._last[rows])]
-        return drawn
+    walks = RowSampler(entries(matrix)).walk(here.ravel(), generations, rng)
+    return np.stack([states.reshape(here.shape) for states in walks], axis=-1)
 
 
 def _frame(**columns: Ints) -> pd.DataFrame:

@@ -13,7 +13,7 @@ from scipy.stats import spearmanr
 
 from nichechain.chain.counts import TransitionCounts
 from nichechain.chain.estimators import Estimator, estimate
-from nichechain.core.checks import as_floats, check_at_least
+from nichechain.core.checks import as_floats, check_at_least, check_choice
 from nichechain.core.errors import NichechainError
 from nichechain.core.randomness import Purpose, keyed
 from nichechain.evolvability.niches import answer_for_niches
@@ -161,8 +161,7 @@ def rank_stability(
     parts = np.sort(np.atleast_1d(as_floats("fractions", fractions)), axis=None)
     if not parts.size or not ((parts > 0) & (parts < 1)).all():
         raise NichechainError(f"fractions are {tuple(parts.tolist())}, but must be between 0 and 1")
-    if thin not in get_args(Thin):
-        raise NichechainError(f"thin is {thin!r}, but must be one of {', '.join(get_args(Thin))}")
+    check_choice("thin", thin, get_args(Thin))
     question = Question(l, lineages, draws=draws, seed=seed)
     check_at_least(1, repeats=repeats)
     check_at_least(0, min_births=min_births)

@@ -9,9 +9,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from nichechain.core.checks import check_choice
 from nichechain.core.errors import NichechainError
 from nichechain.variation.additive import BOUND_KINDS, AdditiveMutation, Bound, Mutation
-from nichechain.variation.noise import BallNoise, CauchyNoise, GaussianNoise, Noise, StudentTNoise
+from nichechain.variation.noise import BallNoise, CauchyNoise, GaussianNoise, MutationNoise, StudentTNoise
 from nichechain.variation.self_adaptive import SelfAdaptiveDomain, SelfAdaptiveMutation
 
 __all__ = [
@@ -50,7 +51,7 @@ def uniform_ball(scale: float = 1.0) -> AdditiveMutation:
     return AdditiveMutation(BallNoise(), scale)
 
 
-_NOISES: dict[str, Callable[[], Noise]] = {
+_NOISES: dict[str, Callable[[], MutationNoise]] = {
     "cauchy": CauchyNoise,
     "gaussian": GaussianNoise,
     "student-t": StudentTNoise,
@@ -58,7 +59,7 @@ _NOISES: dict[str, Callable[[], Noise]] = {
 }
 
 
-def noise_of(name: str, df: float | None = None) -> Noise:
+def noise_of(name: str, df: float | None = None) -> MutationNoise:
     """The noise of the operator of that name.
 
     Parameters
@@ -72,8 +73,7 @@ def noise_of(name: str, df: float | None = None) -> Noise:
     NichechainError
         If there is none, or degrees of freedom are given to another than student-t.
     """
-    if name not in _NOISES:
-        raise NichechainError(f"mutation is {name!r}, but must be one of {', '.join(_NOISES)}")
+    check_choice("mutation", name, _NOISES)
     if df is None:
         return _NOISES[name]()
     if name != "student-t":

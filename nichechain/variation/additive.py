@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Protocol, get_args
+from typing import Any, Protocol, cast, get_args, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
-from nichechain.core.checks import StepBound, check_numbers
+from nichechain.core.checks import StepBound, check_choice, check_positive
 from nichechain.core.errors import NichechainError
-from nichechain.variation.noise import IndependentNoise, Noise, truncated
+from nichechain.domains.base import Domain, Wrapper
+from nichechain.variation.noise import IndependentNoise, MutationNoise, truncated
 
 Floats = NDArray[np.float64]
 # Of floats of any precision: that of float32 in a search, of others in a test.
@@ -56,13 +57,8 @@ class Bound:
     size: float
 
     def __post_init__(self) -> None:
-        if self.kind not in BOUND_KINDS:
-            raise NichechainError(
-                f"step bound is of kind {self.kind!r}, but must be one of {', '.join(BOUND_KINDS)}"
-            )
-        check_numbers(step_bound=self.size)
-        if not (np.isfinite(self.size) and self.size > 0):
-            raise NichechainError(f"step bound is {self.size:g}, but must be a positive number")
+        check_choice("kind of step bound", self.kind, BOUND_KINDS)
+        check_positive(step_bound=self.size)
 
 
 @dataclass(frozen=True)
@@ -71,7 +67,7 @@ class AdditiveMutation:
 
     Parameters
     ----------
-    noise : Noise
+    noise : MutationNoise
         ``noise(rng, n)`` gives n float64 values at scale 1.
     scale : float
         Factor on the noise, positive.
@@ -95,25 +91,21 @@ class AdditiveMutation:
     never leave the set.
     """
 
-    noise: Noise
+    noise: MutationNoise
     scale: float = 1.0
     bound: Bound | None = None
     layers: tuple[int, ...] = ()
     layer_scales: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
-        check_numbers(mutation_scale=self.scale)
-        if not (np.isfinite(self.scale) and self.scale > 0):
-            raise NichechainError(f"mutation scale is {self.scale}, but must be a positive number")
+        check_positive(scale=self.scale)
         if len(self.layers) != len(self.layer_scales):
             raise NichechainError(
                 f"layer scales are {_listed(self.layer_scales)}, but there are {len(self.layers)} layers "
                 f"({_listed(self.layers)} weights): one scale per layer"
             )
         for scale in self.layer_scales:
-            check_numbers(layer_scale=scale)
-            if not (np.isfinite(scale) and scale > 0):
-                raise NichechainError(f"layer scale is {scale:g}, but must be a positive number")
+            check_positive(layer_scale=scale)
         check_bound(self.noise, self.bound)
 
     def __call__(self, parent: Genotype, rng: np.random.Generator) -> Genotype:
@@ -131,7 +123,7 @@ class AdditiveMutation:
         return self.scale * np.repeat(self.layer_scales, self.layers)
 
 
-def check_bound(noise: Noise, bound: Bound | None) -> None:
+def check_bound(noise: MutationNoise, bound: Bound | None) -> None:
     """Check that noise can be bounded so.
 
     Raises
@@ -147,7 +139,11 @@ def check_bound(noise: Noise, bound: Bound | None) -> None:
 
 
 def add_noise(
-    parent: Genotype, rng: np.random.Generator, noise: Noise, scale: float | Floats, bound: Bound | None
+    parent: Genotype,
+    rng: np.random.Generator,
+    noise: MutationNoise,
+    scale: float | Floats,
+    bound: Bound | None,
 ) -> Genotype:
     """One child of a parent.
 
@@ -155,7 +151,7 @@ def add_noise(
     ----------
     parent : (P,) float array
     rng : numpy.random.Generator
-    noise : Noise
+    noise : MutationNoise
     scale : float or (P,) array
         Factor on the noise.
     bound : Bound, optional
@@ -191,3 +187,78 @@ def _rounded(parent: Genotype, step: Floats, limit: Floats) -> Genotype:
 
 def _listed(values: tuple[float, ...]) -> str:
     return ", ".join(f"{value:g}" for value in values) or "none"
+
+
+@runtime_checkable
+class Layered(Protocol):
+    """A domain or controller whose genotype is made of layers."""
+
+    @property
+    def layers(self) -> tuple[int, ...]:
+        """Evolved parameters of each layer, in the order of the genotype."""
+        ...
+
+
+def layers_of(domain: Domain) -> tuple[int, ...]:
+    """Evolved parameters of each layer of a domain's controller.
+
+    A domain tells its layers by a property ``layers``, or by a ``network`` that has one, such as
+    :class:`nichechain.domains.policies.controllers.MLP`.
+
+    Raises
+    ------
+    NichechainError
+        If it has no layers, or they do not make up its genotype.
+    """
+    told: object = domain
+    while isinstance(told, Wrapper):
+        told = told.domain
+    if not isinstance(told, Layered):
+        told = getattr(told, "network", None)
+    if not isinstance(told, Layered):
+        raise NichechainError(f"{domain.name} has no layers, so it takes one scale and no layer scales")
+    layers = tuple(int(size) for size in told.layers)
+    if sum(layers) != domain.genotype_length:
+        raise NichechainError(
+            f"the layers of {domain.name} have {sum(layers)} parameters together, "
+            f"but its genotypes have {domain.genotype_length}"
+        )
+    return layers
+
+
+def parse_step_bound(text: str, name: str = "step_bound") -> tuple[StepBound, float]:
+    """``"per-coordinate:2"`` as ``("per-coordinate", 2.0)``.
+
+    Raises
+    ------
+    NichechainError
+        If the text is no such thing.
+    """
+    kind, _, size = text.partition(":")
+    try:
+        bound = Bound(cast(StepBound, kind), float(size))
+    except (ValueError, NichechainError):
+        raise NichechainError(
+            f"{name} is {text!r}, but must be per-coordinate:SIZE or rescaled:SIZE with a positive "
+            "size, such as per-coordinate:2"
+        ) from None
+    return bound.kind, bound.size
+
+
+def parse_layer_scales(text: str, name: str = "layer_scales") -> tuple[float, ...]:
+    """``"1,0.5,0.5"`` as ``(1.0, 0.5, 0.5)``.
+
+    Raises
+    ------
+    NichechainError
+        If the text is no such thing.
+    """
+    try:
+        scales = tuple(float(part) for part in text.split(","))
+    except ValueError:
+        scales = ()
+    if not scales or not all(0 < scale < float("inf") for scale in scales):
+        raise NichechainError(
+            f"{name} is {text!r}, but must be positive numbers, one per layer, such as 1,0.5,0.5"
+        )
+    return scales

@@ -8,13 +8,12 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
-from nichechain.core.checks import check_numbers
-from nichechain.core.errors import NichechainError
+from nichechain.core.checks import check_positive
 
 Floats = NDArray[np.float64]
 
 
-class Noise(Protocol):
+class MutationNoise(Protocol):
     """A distribution of steps."""
 
     def __call__(self, rng: np.random.Generator, n: int) -> Floats:
@@ -23,7 +22,7 @@ class Noise(Protocol):
 
 
 @runtime_checkable
-class IndependentNoise(Noise, Protocol):
+class IndependentNoise(MutationNoise, Protocol):
     """Coordinates that are independent and alike, symmetric about 0 and continuous."""
 
     def tail(self, x: Floats) -> Floats:
@@ -90,9 +89,7 @@ class StudentTNoise:
     df: float = 3.0
 
     def __post_init__(self) -> None:
-        check_numbers(df=self.df)
-        if not (np.isfinite(self.df) and self.df > 0):
-            raise NichechainError(f"df is {self.df:g}, but degrees of freedom are a positive number")
+        check_positive(df=self.df)
 
     def __call__(self, rng: np.random.Generator, n: int) -> Floats:
         """One step, (n,)."""

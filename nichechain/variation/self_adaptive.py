@@ -12,12 +12,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from nichechain.core.checks import check_numbers, check_whole
+from nichechain.core.checks import check_positive, check_whole
 from nichechain.core.errors import NichechainError
-from nichechain.domains.base import Domain, Evaluation, check_genotypes
-from nichechain.domains.wrapper import Wrapper
+from nichechain.domains.base import Domain, Evaluation, Wrapper, check_genotypes
 from nichechain.variation.additive import Bound, Genotype, add_noise, check_bound
-from nichechain.variation.noise import Noise
+from nichechain.variation.noise import MutationNoise
 
 if TYPE_CHECKING:
     from torch import nn
@@ -29,7 +28,7 @@ class SelfAdaptiveMutation:
 
     Parameters
     ----------
-    noise : Noise
+    noise : MutationNoise
         What is added to the weights at step size 1.
     layers : tuple of int
         Weights that share a step size, in the order of the genotype; one entry for one step size.
@@ -43,7 +42,7 @@ class SelfAdaptiveMutation:
     Without selection ln σ has no drift, so σ keeps its median.
     """
 
-    noise: Noise
+    noise: MutationNoise
     layers: tuple[int, ...]
     bound: Bound | None = None
 
@@ -86,9 +85,7 @@ class SelfAdaptiveDomain(Wrapper):
         if not step_sizes:
             raise NichechainError("step_sizes is empty, but there must be one for each layer, or one for all")
         for size in step_sizes:
-            check_numbers(step_size=size)
-            if not (np.isfinite(size) and size > 0):
-                raise NichechainError(f"step size is {size:g}, but must be a positive number")
+            check_positive(step_size=size)
         super().__init__(domain)
         self.step_sizes = step_sizes
 

@@ -8,6 +8,6 @@ its configuration: the search without a single evaluation, any birth from its ro
 from __future__ import annotations
 
 from nichechain.verification.result import Check, Difference, Verification
-from nichechain.verification.verifying import Progress, verify
+from nichechain.verification.verifying import VerificationProgress, verify
 
-__all__ = ["Check", "Difference", "Progress", "Verification", "verify"]
+__all__ = ["Check", "Difference", "Verification", "VerificationProgress", "verify"]

@@ -20,10 +20,10 @@ from nichechain.domains.base import Domain, Evaluation
 from nichechain.niches import Niches
 from nichechain.search.config import BuildConfig
 from nichechain.search.elites import Elites, SearchState
-from nichechain.search.lineages import Lineages, Stretch
+from nichechain.search.lineages import Stretch, UnderWay
 from nichechain.search.map_elites import MapElites
+from nichechain.verification.record import Births, Bools, Run, differs, largest_difference
 from nichechain.verification.result import SEARCH, Check
-from nichechain.verification.runs import Births, Bools, Run, differs, largest_difference
 
 _GROUP = "search"
 
@@ -164,7 +164,7 @@ def check_pending_again(pending: Offspring, again: Offspring) -> list[Check]:
     return [_check("pending children are the rest of the last step", wrong, pending.uid)]
 
 
-def check_lineages_again(lineages: Lineages, again: Lineages) -> list[Check]:
+def check_lineages_again(lineages: UnderWay, again: UnderWay) -> list[Check]:
     """Whether lineages under way are those that follow from the births."""
     name = "lineages under way are at their latest births"
     if len(lineages) != len(again):

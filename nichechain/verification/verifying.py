@@ -11,7 +11,7 @@ import numpy as np
 
 from nichechain.archive import read
 from nichechain.archive.archive import Archive, load
-from nichechain.core.checks import check_seed, check_whole
+from nichechain.core.checks import check_at_least, check_seed
 from nichechain.core.errors import NichechainError
 from nichechain.core.machine import library_versions, machine
 from nichechain.core.randomness import Purpose, keyed
@@ -21,10 +21,9 @@ from nichechain.execution.base import WORKER_DIED
 from nichechain.search.elites import Elites, SearchState
 from nichechain.search.making import make_niches
 from nichechain.verification import record
-from nichechain.verification.evaluations import check_evaluations, evaluated
-from nichechain.verification.replay import Regrowth
+from nichechain.verification.record import Births, Ints, Run, largest_difference, runs_of
+from nichechain.verification.replay import Regrowth, check_evaluations, evaluated
 from nichechain.verification.result import EVALUATION, SEARCH, Check, Difference, Verification
-from nichechain.verification.runs import Births, Ints, Run, largest_difference, runs_of
 from nichechain.verification.search import (
     check_lineages_again,
     check_pending_again,
@@ -35,7 +34,7 @@ from nichechain.verification.search import (
 
 
 @dataclass(frozen=True)
-class Progress:
+class VerificationProgress:
     """How far a verification is.
 
     Parameters
@@ -57,7 +56,7 @@ def verify(
     sample: int | None = 100,
     seed: int = 0,
     executor: Executor | None = None,
-    on_progress: Callable[[Progress], None] | None = None,
+    on_progress: Callable[[VerificationProgress], None] | None = None,
 ) -> Verification:
     """Make parts of an archive again from its configuration, and compare to the bit.
 
@@ -92,9 +91,7 @@ def verify(
     with probability 1 - C(N - k, n) / C(N, n), about 1 - (1 - n/N)^k.
     """
     if sample is not None:
-        check_whole(sample=sample)
-    if sample is not None and sample < 0:
-        raise NichechainError(f"sample is {sample}, but must not be negative")
+        check_at_least(0, sample=sample)
     check_seed(seed)
     archive = archive if isinstance(archive, Archive) else load(archive)
     with ExitStack() as stack:
@@ -134,7 +131,7 @@ class _Work:
     sample: int | None
     seed: int
     executor: Executor
-    on_progress: Callable[[Progress], None] | None
+    on_progress: Callable[[VerificationProgress], None] | None
     checks: list[Check] = field(default_factory=list)
     unverified: list[str] = field(default_factory=list)
     sampled_births: int = 0
@@ -178,7 +175,7 @@ class _Work:
             nonlocal done
             done += more
             if self.on_progress is not None:
-                self.on_progress(Progress(stage, done, total))
+                self.on_progress(VerificationProgress(stage, done, total))
 
         tell(0)
         return tell
@@ -198,7 +195,7 @@ class _Work:
             self.checks.append(Check(f"the search can be made again ({error})", "search", 1, 1))
             return
         self.checks += check_search(births, Births.concatenate([again.births for again in made]))
-        winners = _winners([again.state.elites for again in made])
+        winners = Elites.concatenate([again.state.elites for again in made]).winners()
         self.checks += check_winners(self.archive.elites, winners)
         if self.archive.meta.origin is None:
             self.checks += check_pending_again(state.pending, made[0].state.pending)
@@ -276,13 +273,3 @@ def _check_domain(archive: Archive, domain: Domain) -> Check:
         apart,
         EVALUATION,
     )
-
-
-def _winners(elites: list[Elites]) -> Elites:
-    """Of every niche, the elite with the largest key among runs; of equal keys, that of the first."""
-    pooled = elites[0]
-    for more in elites[1:]:
-        pooled = Elites.concatenate(pooled, more)
-    pooled = pooled[np.lexsort((pooled.uid, -pooled.key, pooled.niche))]
-    _, first = np.unique(pooled.niche, return_index=True)
-    return pooled[first]

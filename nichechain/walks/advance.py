@@ -149,7 +149,7 @@ class Walks:
             archive=NoveltyArchive.empty(archives, axes),
             stalls=np.zeros(len(run), np.int64),
         )
-        rows = births.table(
+        rows = births.make_table(
             offspring,
             evaluation,
             child_niche=niche,
@@ -223,7 +223,7 @@ class Walks:
             **{name: values[rows, chosen] for name, values in everyone.items()},
         )
         record = self._record(state, after, children, landed, score[rows, chosen], stalled)
-        table = births.table(
+        table = births.make_table(
             offspring,
             evaluation,
             child_niche=landed,

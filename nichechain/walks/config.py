@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from nichechain.core.checks import check_seed, check_whole
+from nichechain.core.checks import check_at_least, check_seed, check_whole
 from nichechain.core.errors import NichechainError
 from nichechain.core.randomness import Purpose, keyed
 from nichechain.walks.diversity import ArchiveRule, KNearest, Metric
@@ -51,13 +51,9 @@ class WalkConfig:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        check_whole(offspring=self.offspring)
+        check_at_least(1, offspring=self.offspring)
         if self.states is not None:
-            check_whole(states=self.states)
-        if self.offspring < 1:
-            raise NichechainError(f"offspring is {self.offspring}, but at least 1 is needed")
-        if self.states is not None and self.states < 1:
-            raise NichechainError(f"states is {self.states}, but at least 1 is needed")
+            check_at_least(1, states=self.states)
         check_seed(self.seed)
 
     @property

@@ -13,7 +13,7 @@ from typing import Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from nichechain.core.checks import check_numbers
+from nichechain.core.checks import check_numbers, check_share
 from nichechain.core.errors import NichechainError
 
 Floats = NDArray[np.float64]
@@ -102,9 +102,7 @@ class TopFraction:
     ties: Literal["random", "all"] = "random"
 
     def __post_init__(self) -> None:
-        check_numbers(fraction=self.fraction)
-        if not 0 < self.fraction <= 1:
-            raise NichechainError(f"fraction is {self.fraction}, but must be above 0 and at most 1")
+        check_share(fraction=self.fraction)
         if self.ties not in ("random", "all"):
             raise NichechainError(f"ties is {self.ties!r}, but must be random or all")
 

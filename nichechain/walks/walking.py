@@ -9,7 +9,7 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import ArrayLike, NDArray
 
-from nichechain.core.checks import as_floats, check_whole
+from nichechain.core.checks import as_floats, check_at_least, check_choice
 from nichechain.core.errors import NichechainError
 from nichechain.core.randomness import Purpose, keyed
 from nichechain.domains.base import Domain
@@ -48,8 +48,7 @@ class WalkResult:
             If it records no such thing.
         """
         known = [field.name for field in fields(StepRecord)]
-        if measure not in known:
-            raise NichechainError(f"measure is {measure!r}, but must be one of {', '.join(known)}")
+        check_choice("measure", measure, known)
         return np.stack([getattr(record, measure) for record in self.records])
 
     def table(self) -> pa.Table:
@@ -84,9 +83,7 @@ def walk(
     NichechainError
         As there, or if ``steps`` is negative.
     """
-    check_whole(steps=steps)
-    if steps < 0:
-        raise NichechainError(f"steps is {steps}, but must not be negative")
+    check_at_least(0, steps=steps)
     walks = Walks(domain, mutate, config, niches)
     state, first = walks.start(runs, executor, genotypes)
     records, tables = [], [first]

@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 from nichechain import Archive, NicheChain, build, load
-from nichechain.archive.build import Progress
+from nichechain.archive.build import BuildProgress
 from nichechain.core.errors import ArchiveError, NichechainError
 from nichechain.domains import FetchPickAndPlace, PlanarArm
 from nichechain.execution import Threads
@@ -136,7 +136,7 @@ class FragileArm(PlanarArm):
 
 def test_births_that_failed_are_null(tmp_path: Path) -> None:
     config = replace(ARM, domain="fragile", evaluations=200)
-    seen: list[Progress] = []
+    seen: list[BuildProgress] = []
     with Threads(1) as executor:
         build(config, tmp_path, executor, domain=FragileArm(), on_progress=seen.append)
     archive = load(tmp_path, domain=FragileArm())

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from nichechain.archive import filling as building
 from nichechain.archive import read, write
-from nichechain.archive.build import Progress, build
+from nichechain.archive.build import BuildProgress, build
 from nichechain.core.errors import ArchiveError, NichechainError
 from nichechain.domains import Evaluation, PlanarArm
 from nichechain.domains.base import Domain
@@ -277,7 +277,7 @@ def test_resumes_after_many_interrupts(short: dict[str, bytes], tmp_path: Path) 
 
 
 def test_progress(tmp_path: Path) -> None:
-    seen: list[Progress] = []
+    seen: list[BuildProgress] = []
     with Threads(2) as executor:
         build(SHORT, tmp_path, executor, domain=RoughArm(), on_progress=seen.append)
     births = [progress.births for progress in seen]
@@ -290,7 +290,7 @@ def test_progress(tmp_path: Path) -> None:
     assert last.outside == (rows["child_niche"] == 63).sum() > 0
     assert last.failed == rows["failed"].notna().sum() > 0
     # Going on, it begins where it stood.
-    again: list[Progress] = []
+    again: list[BuildProgress] = []
     with Threads(2) as executor:
         build(
             replace(SHORT, evaluations=340), tmp_path, executor, domain=RoughArm(), on_progress=again.append
@@ -302,7 +302,7 @@ def test_progress(tmp_path: Path) -> None:
 def test_an_interrupt_in_the_progress_bar_loses_nothing(short: dict[str, bytes], tmp_path: Path) -> None:
     calls = itertools.count()
 
-    def interrupt(_progress: Progress) -> None:
+    def interrupt(_progress: BuildProgress) -> None:
         if next(calls) == 30:
             raise KeyboardInterrupt
 
@@ -336,7 +336,7 @@ def test_configurations_that_do_not_go_on(
     [
         ({"domain": "ant"}, "domain is 'ant'"),
         ({"mutation": "levy"}, "mutation is 'levy'"),
-        ({"scale": 0.0}, "mutation scale is 0.0"),
+        ({"scale": 0.0}, "scale is 0.0"),
         ({"shape": (9,)}, "grid has 1 axes but bounds have 2"),
         ({"shape": (9, 0)}, "every axis needs at least 1 cell"),
         ({"bounds": ((0.0, 0.0), (0.0, 1.0))}, "bounds are 0 to 0"),

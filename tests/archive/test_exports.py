@@ -214,7 +214,7 @@ def test_missing_columns_and_parents(tmp_path):
         with pytest.raises(NichechainError, match="births have no column run"):
             write(births.drop(columns="run"))
     for write in (lambda frame: write_phylogeny(frame, NICHES, tmp_path / "a"), genealogy):
-        with pytest.raises(NichechainError, match="birth 2 has parent 1, but there is no such birth"):
+        with pytest.raises(NichechainError, match="birth 2 of run 0 has parent 1, but there is no such"):
             write(births.drop(index=1))
     assert list(tmp_path.iterdir()) == []
 
@@ -240,7 +240,7 @@ def test_a_file_is_replaced_whole_or_not_at_all(tmp_path, monkeypatch):
     def full(_):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("nichechain.archive.exports.os.fsync", full)
+    monkeypatch.setattr("nichechain.core.files.os.fsync", full)
     with pytest.raises(NichechainError, match="cannot be written: No space left on device"):
         write_edges(nx.DiGraph(), path)
     assert path.read_bytes() == before

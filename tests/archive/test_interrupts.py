@@ -14,7 +14,7 @@ import pytest
 
 import nichechain
 from nichechain.archive import read
-from nichechain.core.locking import writing
+from nichechain.core.files import writing
 
 ROOT = Path(nichechain.__file__).parents[1]
 

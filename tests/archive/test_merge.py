@@ -7,9 +7,8 @@ import pandas as pd
 import pytest
 
 import nichechain as nc
-from nichechain.archive.merge import _largest, merge
+from nichechain.archive.merge import merge
 from nichechain.core.errors import ArchiveError, NichechainError
-from nichechain.search.elites import Elites
 
 CONFIG = nc.BuildConfig(
     "arm", (5, 4), ((-0.7, 1.0), (-0.9, 0.8)), evaluations=300, initial=40, batch=32, scale=0.5
@@ -96,17 +95,6 @@ def test_order_and_grouping_do_not_matter(runs, tmp_path):
         np.testing.assert_array_equal(other.elites.key, forth.elites.key)
     assert grouped.births().equals(forth.births())
     assert grouped.meta.origin == forth.meta.origin
-
-
-def test_the_earlier_birth_wins_a_tie():
-    def elites(uid, key):
-        one = np.zeros(1)
-        return Elites(
-            np.array([3]), one[:, None], one[:, None], one, np.array([key]), np.array([uid]), np.zeros(1, int)
-        )
-
-    assert _largest([elites(9, 1.0), elites(4, 1.0)]).uid.tolist() == [4]
-    assert _largest([elites(4, 1.0), elites(9, 2.0)]).uid.tolist() == [9]
 
 
 def test_no_build_goes_on_with_it(runs, tmp_path):

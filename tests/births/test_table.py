@@ -31,7 +31,7 @@ def _four_births(parent_uid, parent_niche, child_niche, failed):
         np.arange(n) == 1,
     )
     accepted = (np.arange(n) % 2 == 0) & ~failed
-    return births.table(
+    return births.make_table(
         offspring, evaluation, child_niche=np.array(child_niche, np.int64), accepted=accepted, step=6
     )
 

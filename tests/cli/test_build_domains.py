@@ -4,7 +4,7 @@ import pytest
 
 import nichechain as nc
 from nichechain.cli import main
-from nichechain.cli.build import Build
+from nichechain.cli.build import BuildCommand
 from nichechain.cli.console import parse
 
 
@@ -20,21 +20,21 @@ from nichechain.cli.console import parse
     ],
 )  # fmt: skip
 def test_options_of_the_domain(words, expected):
-    assert parse(Build, ["arm", *words]).domain_options() == expected
+    assert parse(BuildCommand, ["arm", *words]).domain_options() == expected
 
 
 def test_bounds_of_an_environment_are_told_to_it():
     words = ["gym:Swimmer-v5", "--bounds=-1,1,-2,2", "--steps", "20"]
-    config = parse(Build, words).config()
+    config = parse(BuildCommand, words).config()
     assert config.domain_options == {"bounds": "-1,1,-2,2", "steps": 20}
     assert config.bounds == ((-1.0, 1.0), (-2.0, 2.0))
 
 
 def test_bounds_of_an_environment_with_sensitivity_as_a_third_axis():
     words = ["gym:Swimmer-v5", "--bounds=-1,1,-2,2", "--noise", "action:0.1", "--grid", "4x4x4"]
-    config = parse(Build, [*words, "--options", "axes=x,y,sensitivity"]).config()
+    config = parse(BuildCommand, [*words, "--options", "axes=x,y,sensitivity"]).config()
     assert config.bounds == ((-1.0, 1.0), (-2.0, 2.0), (0.0, 0.5))
-    again = parse(Build, ["gym:Swimmer-v5"], default=Build.of(config))
+    again = parse(BuildCommand, ["gym:Swimmer-v5"], default=BuildCommand.of(config))
     assert again.config() == config
 
 
@@ -47,13 +47,13 @@ def test_bounds_of_an_environment_with_sensitivity_as_a_third_axis():
     ],
 )
 def test_a_configuration_asks_for_itself(words):
-    config = parse(Build, words).config()
+    config = parse(BuildCommand, words).config()
     assert nc.BuildConfig.from_json(config.to_json()) == config
-    assert parse(Build, words[:1], default=Build.of(config)).config() == config
+    assert parse(BuildCommand, words[:1], default=BuildCommand.of(config)).config() == config
 
 
 def test_the_folder_of_an_environment_is_a_plain_name():
-    assert parse(Build, ["gym:ALE/Pong-v5", "--seed", "3"]).folder.parts == (
+    assert parse(BuildCommand, ["gym:ALE/Pong-v5", "--seed", "3"]).folder.parts == (
         "archives",
         "gym-ALE-Pong-v5-seed3",
     )

@@ -108,7 +108,7 @@ def test_goes_on_after_an_interruption_to_the_same_bytes(built, tmp_path, monkey
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        (["--offspring", "1"], "sample_size is 1, but evolvability needs at least 2"),
+        (["--offspring", "1"], "sample_size is 1, but must be at least 2"),
         (["--elites", "0"], "elites is 0"),
         (["--share", "2"], "share is 2"),
         (["--seed", "-1"], "seed is -1"),

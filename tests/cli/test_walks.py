@@ -11,7 +11,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from nichechain.cli import main
-from nichechain.cli.walks import MetricName, Metrics, Mode, Pressure, Sensitivity
+from nichechain.cli.walks import MetricName, MetricsCommand, Mode, PressureCommand, SensitivityCommand
 from nichechain.studies import (
     LEVELS,
     METRICS,
@@ -127,12 +127,12 @@ def test_interrupted(tmp_path):
 def test_defaults_are_those_of_the_studies():
     """The command line writes them out again, so that its help need not import the studies."""
     out = Path("study")
-    assert Pressure("arm", out).conditions() == pressure_conditions(LEVELS, Condition("base"))
-    assert Metrics("arm", out).conditions() == metric_conditions(METRICS, Condition("base"))
+    assert PressureCommand("arm", out).conditions() == pressure_conditions(LEVELS, Condition("base"))
+    assert MetricsCommand("arm", out).conditions() == metric_conditions(METRICS, Condition("base"))
     assert get_args(MetricName) == get_args(conditions.MetricName)
     assert get_args(Mode) == get_args(conditions.Mode)
     for name in VARIATIONS:
-        assert Sensitivity("arm", out, vary=name).conditions() == variations(name, Condition("base"))
+        assert SensitivityCommand("arm", out, vary=name).conditions() == variations(name, Condition("base"))
 
 
 def test_help(capsys):
@@ -166,7 +166,7 @@ def test_help(capsys):
         (["pressure", "arm", "--domain-seed", "-1"], "seed is -1"),
         (["pressure", "arm", "--scale", "inf"], "scale is inf"),
         (["pressure", "arm", "--mutation", "jump"], "mutation is 'jump'"),
-        (["pressure", "arm", "--archive-limit", "0"], "archive limit is 0"),
+        (["pressure", "arm", "--archive-limit", "0"], "archive_limit is 0"),
         (["pressure", "arm", "--initialisation", "zeros"], "initialisation is 'zeros'"),
         (["pressure", "arm", "--initialisation", "orthogonal"], "arm has no fully connected network"),
         (["pressure", "arm", "--grid", "4"], "arm has 2 axes"),

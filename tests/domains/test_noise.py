@@ -257,7 +257,7 @@ class Silent:
         (lambda: WithSensitivity(arm(), ["x", "y"]), "but must be sensitivity and some of x, y"),
         (lambda: WithSensitivity(arm(), ["sensitivity", "z"]), "axes are sensitivity, z"),
         (lambda: WithSensitivity(arm(), ["sensitivity", "x", "x"]), "each once"),
-        (lambda: WithSensitivity(arm(), ["sensitivity"], most=0), "the most sensitivity is 0"),
+        (lambda: WithSensitivity(arm(), ["sensitivity"], most=0), "most is 0"),
     ],
 )
 def test_bad_input_is_one_sentence(make_it, message):

@@ -234,7 +234,7 @@ def test_simulation_stays_in_its_row_for_the_largest_random_number():
 
 
 def test_simulation_in_pieces_of_bounded_memory(monkeypatch):
-    monkeypatch.setattr(coverage, "_SIMULATION_CELLS", 70)
+    monkeypatch.setattr(coverage, "_CELLS", 70)
     rng = np.random.default_rng(2)
     transition = _random_chain(rng, 5)
     found = sampled_coverage(transition, transition[0], 3, 4, 3001, rng)
@@ -302,7 +302,7 @@ def test_lengths_are_refused(generations, lineages, message):
 
 @pytest.mark.parametrize(
     ("generations", "lineages", "repeats", "message"),
-    [(0, 1, 1, "l is 0"), (1, 0, 1, "lineages is 0"), (1, 1, 0, "repeats is 0")],
+    [(0, 1, 1, "steps is 0"), (1, 0, 1, "lineages is 0"), (1, 1, 0, "repeats is 0")],
 )
 def test_simulation_refuses(generations, lineages, repeats, message):
     with pytest.raises(NichechainError, match=message):

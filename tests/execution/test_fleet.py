@@ -43,6 +43,9 @@ class FakeFleet(Fleet):
     def _size(self) -> int:
         return self.size
 
+    def _neighbours(self) -> int:
+        return self._size()
+
     def _send(self, domain: bytes) -> None:
         self.sent = domain
 
@@ -54,7 +57,7 @@ class FakeFleet(Fleet):
 class FakeWorker(Worker):
     def __init__(self, fleet: FakeFleet) -> None:
         self.fleet = fleet
-        self.bench = Workbench(fleet.sent)
+        self.bench = Workbench(fleet.sent, fleet._cache_share)
         self.pool = ThreadPoolExecutor(1)
         self.out = 0
         self.lock = threading.Lock()

@@ -31,10 +31,10 @@ def test_processes(workers: str, count: int) -> None:
 @pytest.mark.parametrize(
     ("workers", "said"),
     [
-        ("0", "workers is 0, but at least 1 is needed"),
-        ("-2", "workers is -2, but at least 1 is needed"),
-        ("threads:0", "workers is 0, but at least 1 is needed"),
-        ("processes:-1", "workers is -1, but at least 1 is needed"),
+        ("0", "workers is 0, but must be at least 1"),
+        ("-2", "workers is -2, but must be at least 1"),
+        ("threads:0", "workers is 0, but must be at least 1"),
+        ("processes:-1", "workers is -1, but must be at least 1"),
         *(
             (odd, f"workers is '{odd}', but must be a number of threads, threads:N, processes:N, ray")
             for odd in (

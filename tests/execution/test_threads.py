@@ -138,5 +138,5 @@ def test_default_workers_are_the_processors_of_this_process() -> None:
 
 @pytest.mark.parametrize("workers", [0, -2])
 def test_workers_that_are_none(workers: int) -> None:
-    with pytest.raises(NichechainError, match=f"workers is {workers}, but at least 1 is needed"):
+    with pytest.raises(NichechainError, match=f"workers is {workers}, but must be at least 1"):
         Threads(workers)

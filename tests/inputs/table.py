@@ -137,7 +137,7 @@ _CALLED = {
     "layers": "weights_of_a_layer",
     "names": "(measure|axes|bounds)",
     "niches": "state",
-    "offspring": "behaviors",
+    "offspring": "(behaviors|sample_size)",
     "other": "niches",
     "parent": "(state|parents)",
     "parents": "parent",

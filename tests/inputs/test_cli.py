@@ -24,6 +24,7 @@ _REAL = ("three", "")
 _POSITIVE = ("0", "-1", "nan", "inf", *_REAL)
 _SHARE = ("-0.1", "1.1", "nan", *_REAL)
 _UNKNOWN = ("no-such-thing", "3", "")
+_MEMORY = ("-1", "two", "2TB", "1.5.2GB", "")
 _WORKERS = ("0", "-1", "three", "threads:0", "processes:x", "ray:x")
 _NICHE = ("9,9", "-1", "a", "0,", "0;0", "1,2,3", "999", "")
 _GRID = ("0x2", "2", "axb", "2x", "-1x2", "1000000x1000000", "2x2x2", "")
@@ -53,6 +54,7 @@ _WALKS: dict[str, Sequence[str]] = {
     "options": ("joints", "joints=0", "no_such_option=3", "=3"),
     "steps": _NATURAL,
     "workers": _WORKERS,
+    "cache_memory": _MEMORY,
 }
 _LEVEL = ("no-such-thing", "2", "0", "-0.5", "nan")
 _KDE = {"bandwidth": _POSITIVE, "mode": _UNKNOWN, "decay": ("0", "1.1", "nan", *_REAL)}
@@ -60,7 +62,7 @@ _KDE = {"bandwidth": _POSITIVE, "mode": _UNKNOWN, "decay": ("0", "1.1", "nan", *
 TABLE: tuple[tuple[str, str, tuple[str, ...], Bad], ...] = (
     (
         "build",
-        "Build",
+        "BuildCommand",
         ("arm", "--evaluations", "20", "--initial", "5", "--grid", "2x2", "--out", "{fresh}"),
         {
             "domain": ("no-such-thing", "3", "gym:", "gym:NoSuch-v0"),
@@ -90,6 +92,7 @@ TABLE: tuple[tuple[str, str, tuple[str, ...], Bad], ...] = (
             "repeats": _COUNT,
             "options": ("joints", "joints=0", "no_such_option=3", "=3", "joints=1.5"),
             "workers": _WORKERS,
+            "cache_memory": _MEMORY,
             "max_failed": _SHARE,
             "out": ("{archive}", "{archive}/meta.json"),
         },
@@ -107,7 +110,7 @@ TABLE: tuple[tuple[str, str, tuple[str, ...], Bad], ...] = (
     ),
     (
         "compare",
-        "Compare",
+        "CompareCommand",
         ("{archive}", "{archive}", "--resamples", "2"),
         {
             "first": _PATH,
@@ -119,11 +122,11 @@ TABLE: tuple[tuple[str, str, tuple[str, ...], Bad], ...] = (
             **_SCORES,
         },
     ),
-    ("completion", "Completion", ("bash",), {"shell": _UNKNOWN}),
-    ("domains", "Domains", (), {}),
+    ("completion", "CompletionCommand", ("bash",), {"shell": _UNKNOWN}),
+    ("domains", "DomainsCommand", (), {}),
     (
         "estimate",
-        "Estimate",
+        "EstimateCommand",
         ("{archive}",),
         {
             "path": _PATH,
@@ -140,19 +143,19 @@ TABLE: tuple[tuple[str, str, tuple[str, ...], Bad], ...] = (
     ),
     (
         "estimate",
-        "Estimate",
+        "EstimateCommand",
         ("{archive}", "--compare"),
         {"folds": ("1", *_COUNT, "100000"), "seed": ("-1",)},
     ),
     (
         "estimate",
-        "Estimate",
+        "EstimateCommand",
         ("{archive}", "--stability", "--repeats", "1"),
         {"repeats": _COUNT, "min_births": ("100000",), "out": ("file.txt", "/no/such/folder/file.png")},
     ),
     (
         "evolvability",
-        "Evolvability",
+        "EvolvabilityCommand",
         ("{archive}", "--draws", "2"),
         {
             "path": _PATH,
@@ -172,10 +175,15 @@ TABLE: tuple[tuple[str, str, tuple[str, ...], Bad], ...] = (
             **_SCORES,
         },
     ),
-    ("evolvability", "Evolvability", ("{archive}", "--elite", "{niche}"), {"workers": _WORKERS}),
+    (
+        "evolvability",
+        "EvolvabilityCommand",
+        ("{archive}", "--elite", "{niche}"),
+        {"workers": _WORKERS, "cache_memory": _MEMORY},
+    ),
     (
         "explore",
-        "Explore",
+        "ExploreCommand",
         ("{archive}", "--out", "{fresh}"),
         {
             "path": _PATH,
@@ -187,7 +195,7 @@ TABLE: tuple[tuple[str, str, tuple[str, ...], Bad], ...] = (
     ),
     (
         "import",
-        "Import",
+        "ImportCommand",
         ("{log}", "--grid", "3x2", "--bounds", "0,1,0,1", "--out", "{fresh}"),
         {
             "log": ("/no/such/log.csv", "{archive}/meta.json", "{archive}"),
@@ -212,7 +220,7 @@ TABLE: tuple[tuple[str, str, tuple[str, ...], Bad], ...] = (
             "names": ("x", "x,y,z"),
         },
     ),
-    ("info", "Info", ("{archive}",), {"path": _PATH, "format": _UNKNOWN}),
+    ("info", "InfoCommand", ("{archive}",), {"path": _PATH, "format": _UNKNOWN}),
     (
         "landscape",
         "LandscapeCommand",
@@ -230,19 +238,20 @@ TABLE: tuple[tuple[str, str, tuple[str, ...], Bad], ...] = (
             "by": _UNKNOWN,
             "map": ("no-such-thing", "ratio,no-such-thing", ""),
             "workers": _WORKERS,
+            "cache_memory": _MEMORY,
             "out": ("/no/such/folder/table.csv", "{archive}"),
             **_SCORES,
         },
     ),
     (
         "merge",
-        "Merge",
+        "MergeCommand",
         ("{archive}", "{again}", "--out", "{fresh}"),
         {"paths": (*_PATH, "{archive}", "{other}"), "out": ("{archive}",)},
     ),
     (
         "plot",
-        "Plot",
+        "PlotCommand",
         ("{archive}", "reach", "--niche", "{niche}", "--out", "{fresh}.png"),
         {
             "path": _PATH,
@@ -257,19 +266,19 @@ TABLE: tuple[tuple[str, str, tuple[str, ...], Bad], ...] = (
     ),
     (
         "plot",
-        "Plot",
+        "PlotCommand",
         ("{archive}", "reachability", "--out", "{fresh}.png"),
         {"threshold": ("-0.1", "1.1", "nan", *_REAL), "niche": ("0,0",)},
     ),
     (
         "plot",
-        "Plot",
+        "PlotCommand",
         ("{archive}", "evolvability", "--out", "{fresh}.png"),
         {"min_births": _NATURAL, "threshold": ("0.5",)},
     ),
     (
         "sweep",
-        "Sweep",
+        "SweepCommand",
         ("{archive}", "--sizes", "2", "--draws", "2"),
         {
             "path": _PATH,
@@ -283,49 +292,51 @@ TABLE: tuple[tuple[str, str, tuple[str, ...], Bad], ...] = (
     ),
     (
         "validate",
-        "Validate",
+        "ValidateCommand",
         ("{archive}", "--out", "{fresh}", "--elites", "3", "--lineages", "1", "--permutations", "9"),
         {
             "path": _PATH,
             "elites": ("2", *_COUNT),
             "permutations": _COUNT,
             "workers": _WORKERS,
+            "cache_memory": _MEMORY,
             "out": ("{archive}/meta.json",),
             **_SCORES,
         },
     ),
     (
         "verify",
-        "Verify",
+        "VerifyCommand",
         ("{archive}",),
         {
             "path": _PATH,
             "sample": ("-1", "1.5", "some", ""),
             "seed": _NATURAL,
             "workers": _WORKERS,
+            "cache_memory": _MEMORY,
         },
     ),
     (
         "walks pressure",
-        "Pressure",
+        "PressureCommand",
         ("arm", "--out", "{fresh}", "--runs", "2", "--steps", "1", "--offspring", "2"),
         {**_WALKS, "levels": (*_LEVEL, "selective,2", "selective,selective", ""), "metric": _UNKNOWN},
     ),
     (
         "walks pressure",
-        "Pressure",
+        "PressureCommand",
         ("arm", "--out", "{fresh}", "--runs", "2", "--steps", "1", "--metric", "kde"),
         _KDE,
     ),
     (
         "walks metrics",
-        "Metrics",
+        "MetricsCommand",
         ("arm", "--out", "{fresh}", "--runs", "2", "--steps", "1", "--offspring", "2"),
         {**_WALKS, **_KDE, "metrics": ("no-such-thing", "knn,no-such-thing", "knn,knn", ""), "level": _LEVEL},
     ),
     (
         "walks sensitivity",
-        "Sensitivity",
+        "SensitivityCommand",
         ("arm", "--out", "{fresh}", "--runs", "2", "--steps", "1", "--offspring", "2"),
         {
             **{name: values for name, values in _WALKS.items() if name != "scale"},
@@ -336,12 +347,17 @@ TABLE: tuple[tuple[str, str, tuple[str, ...], Bad], ...] = (
     ),
     (
         "walks sensitivity",
-        "Sensitivity",
+        "SensitivityCommand",
         ("arm", "--out", "{fresh}", "--vary", "k", "--metric", "kde", "--runs", "2", "--steps", "1"),
         {**_KDE, "scale": _POSITIVE},
     ),
-    ("walks resume", "Resume", ("{study}",), {"path": _PATH, "runs": _COUNT, "workers": _WORKERS}),
-    ("walks report", "Report", ("{study}",), {"path": _PATH}),
+    (
+        "walks resume",
+        "ResumeCommand",
+        ("{study}",),
+        {"path": _PATH, "runs": _COUNT, "workers": _WORKERS, "cache_memory": _MEMORY},
+    ),
+    ("walks report", "ReportCommand", ("{study}",), {"path": _PATH}),
 )
 
 # What has no bad value: flags, and texts that may be anything.

@@ -163,7 +163,11 @@ CALLS = (
         },
     ),
     *(
-        Call(f"domains.{name}", lambda w: {}, {"seed": SEED, "controller": ("lstm", "mlp:x", "mlp:0")})
+        Call(
+            f"domains.{name}",
+            lambda w: {},
+            {"seed": SEED, "controller": ("lstm", "mlp:x", "mlp:0"), "cache_memory": whole(-1)},
+        )
         for name in ("FetchPickAndPlace", "FetchPush", "FetchReach", "FetchSlide")
     ),
     Call("domains.Noise", lambda w: {}, {"observation": _NOISE, "action": _NOISE, "initial": _NOISE}),

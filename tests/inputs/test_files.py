@@ -247,11 +247,14 @@ CALLS = (
     Call(
         "execution.make",
         lambda w: {"workers": "1"},
-        {"workers": ("0", "-1", "threads:0", "threads:x", "processes:-1", "dask", "1.5", "ray:x", "three")},
+        {
+            "workers": ("0", "-1", "threads:0", "threads:x", "processes:-1", "dask", "1.5", "ray:x", "three"),
+            "cache_memory": ("-1", "two", "2TB", "1.5.2GB", ""),
+        },
     ),
-    Call("execution.Threads", lambda w: {"workers": 1}, {"workers": whole(0)}),
+    Call("execution.Threads", lambda w: {"workers": 1}, {"workers": whole(0), "cache_memory": whole(-1)}),
     Call("Threads", lambda w: {"workers": 1}, {"workers": (0,)}),
-    Call("execution.Processes", lambda w: {"workers": 1}, {"workers": whole(0)}),
+    Call("execution.Processes", lambda w: {"workers": 1}, {"workers": whole(0), "cache_memory": whole(-1)}),
     Call(
         "pyribs.record",
         lambda w: {"scheduler": w.scheduler()},

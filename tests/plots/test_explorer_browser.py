@@ -7,7 +7,7 @@ import pytest
 
 import nichechain as nc
 from nichechain.evolvability.coverage import expected_coverage, visit_probabilities
-from nichechain.plots.explorer import CompactTransition, write_explorer
+from nichechain.plots.explorer import rounded_transition, write_explorer
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 DRIVER = shutil.which("chromedriver")
@@ -101,7 +101,7 @@ def reached(browser, niche):
 def test_page_computes_what_the_library_does(chromium, pages, archive, estimator):
     chromium.get(pages[estimator])
     chain = archive.chain(estimator)
-    transition = CompactTransition.of(chain).toarray()
+    transition = rounded_transition(chain).toarray()
     n = len(archive.niches)
     found = np.stack([reached(chromium, niche) for niche in range(n)], axis=1)
     assert found.shape == (10, n, chain.states)

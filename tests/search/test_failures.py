@@ -72,7 +72,7 @@ def test_a_build_of_which_too_much_fails_stops_and_keeps_what_there_is(tmp_path:
         assert failed > 0.3 * births
         assert said.startswith(f"{failed} of {births} births failed, more than the share of 0.3 that may, ")
         assert f"{failed} of them because: ValueError: torque of 10 joints" in said
-        assert "--resume with a larger --max-failed goes on" in said
+        assert "a build with a larger max_failed goes on" in said
         # It stops again at once, and goes on with leave, to the bytes of one that never stopped.
         with pytest.raises(NichechainError, match=f"{failed} of {births} births failed"):
             build(CONFIG, tmp_path / "a", executor, domain=domain, max_failed=0.3)

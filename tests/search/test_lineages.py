@@ -16,7 +16,7 @@ from nichechain.births.table import NONE
 from nichechain.domains import PlanarArm
 from nichechain.execution import Threads
 from nichechain.search.config import BuildConfig
-from nichechain.search.lineages import Calibration, Lineages, Stretch
+from nichechain.search.lineages import Calibration, Stretch, UnderWay
 
 from .test_map_elites import RoughArm
 
@@ -159,10 +159,10 @@ def test_slots_take_turns(share: float, batch: int) -> None:
 
 def test_lineages_are_found_and_replaced_by_slot() -> None:
     one = np.ones(3, np.int64)
-    three = Lineages(np.array([1, 4, 6]), np.zeros((3, 2), np.float32), np.array([10, 40, 60]), one, one)
+    three = UnderWay(np.array([1, 4, 6]), np.zeros((3, 2), np.float32), np.array([10, 40, 60]), one, one)
     assert three.rows(np.array([6, 0, 1, 7, 4])).tolist() == [2, NONE, 0, NONE, 1]
-    assert Lineages.none(2).rows(np.array([0, 1])).tolist() == [NONE, NONE]
-    new = Lineages(np.array([5, 1]), np.ones((2, 2), np.float32), np.array([51, 11]), one[:2], one[:2])
+    assert UnderWay.none(2).rows(np.array([0, 1])).tolist() == [NONE, NONE]
+    new = UnderWay(np.array([5, 1]), np.ones((2, 2), np.float32), np.array([51, 11]), one[:2], one[:2])
     after = three.after(new, np.array([6]))
     assert after.slot.tolist() == [1, 4, 5]
     assert after.uid.tolist() == [11, 40, 51]

@@ -10,13 +10,12 @@ from torch import nn
 
 from nichechain import BuildConfig, NichechainError, domains, variation
 from nichechain.domains import PlanarArm
+from nichechain.domains.base import Wrapper
 from nichechain.domains.policies.controllers import MLP, ModuleController
-from nichechain.domains.wrapper import Wrapper
 from nichechain.search.making import make_mutation
 from nichechain.variation import AdditiveMutation, Bound, SelfAdaptiveDomain, SelfAdaptiveMutation
-from nichechain.variation.layers import layers_of
+from nichechain.variation.additive import layers_of, parse_layer_scales, parse_step_bound
 from nichechain.variation.noise import CauchyNoise, StudentTNoise
-from nichechain.variation.parsing import parse_layer_scales, parse_step_bound
 
 CONFIG = BuildConfig("arm", (4, 4), PlanarArm.bounds, scale=0.5)
 FETCH = domains.make("fetch")
@@ -95,8 +94,8 @@ def test_layers_of_a_module_follow_the_order_of_its_genotype():
             "have 10 parameters together, but its genotypes have 9",
         ),
         ({"df": 2.0}, PlanarArm(), "only student-t has"),
-        ({"step_bound": ("rescaled", -1)}, PlanarArm(), "step bound is -1"),
-        ({"step_bound": ("cube", 1)}, PlanarArm(), "kind 'cube'"),
+        ({"step_bound": ("rescaled", -1)}, PlanarArm(), "step_bound is -1"),
+        ({"step_bound": ("cube", 1)}, PlanarArm(), "kind of step bound is 'cube'"),
         ({"mutation": "levy"}, PlanarArm(), "mutation is 'levy'"),
     ],
 )

@@ -151,7 +151,7 @@ def test_births_that_do_not_tell_are_refused(archive):
     unknown = births.assign(accepted=pd.Series([None] * len(births), dtype="boolean"))
     with pytest.raises(NichechainError, match="which children entered the archive: column accepted"):
         curiosity(unknown, by="niche")
-    with pytest.raises(NichechainError, match="by is 'cell', but must be elite or niche"):
+    with pytest.raises(NichechainError, match="by is 'cell', but must be one of elite, niche"):
         curiosity(births, by="cell")
 
 

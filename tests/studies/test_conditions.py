@@ -67,7 +67,7 @@ def test_seed_of_a_condition_depends_on_its_label_and_the_study_alone() -> None:
         ({"offspring": 0}, "offspring is 0"),
         ({"mutation": "jump"}, "mutation is 'jump'"),
         ({"scale": -1.0}, "scale is -1.0"),
-        ({"archive_limit": 0}, "archive limit is 0"),
+        ({"archive_limit": 0}, "archive_limit is 0"),
         ({"archive_scope": "world"}, "archive scope is 'world'"),
         ({"initialisation": "zeros"}, "initialisation is 'zeros'"),
         ({"initialisation": "normal:-1"}, "initialisation is 'normal:-1'"),

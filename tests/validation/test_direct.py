@@ -6,9 +6,9 @@ import nichechain as nc
 from nichechain.births.table import NONE
 from nichechain.core.errors import NichechainError
 from nichechain.core.randomness import Purpose, keyed
+from nichechain.core.row_sampler import RowSampler
 from nichechain.domains import Evaluation, PlanarArm
 from nichechain.validation import Lineages, compare, run_lineages, sample_roots, simulate_lineages
-from nichechain.validation.simulate import RowSampler
 
 from .conftest import scattered_chain
 
@@ -139,7 +139,7 @@ def known_check(seed, roots=150, lineages=15, l=4):
     rows = [rng.dirichlet(np.full(50, width)) for width in np.geomspace(0.01, 0.5, 50)]
     chain = nc.NicheChain(rows, niches=niches, outside=49)
     start = np.arange(roots) % 49
-    draw = RowSampler(chain.T)
+    draw = RowSampler(chain.T).draw
     first = draw(np.repeat(start, lineages), rng).reshape(roots, lineages)
     offspring = draw(np.repeat(start, 30), rng).reshape(roots, 30)
     states = simulate_lineages(chain.T, first, l, rng)

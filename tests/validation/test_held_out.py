@@ -105,7 +105,8 @@ def test_same_seed_same_folds():
 
 
 @pytest.mark.parametrize(
-    ("folds", "said"), [(1, "folds is 1, but at least 2"), (9, "folds is 9, but only 2 elites have children")]
+    ("folds", "said"),
+    [(1, "folds is 1, but must be at least 2"), (9, "folds is 9, but only 2 elites have children")],
 )
 def test_bad_folds(folds, said):
     counts = TransitionCounts.from_births([0, 0], [1, 1], GRID, elite=[0, 1])

@@ -81,7 +81,7 @@ def test_join_is_that_of_dictionaries(data):
 
 
 def test_a_parent_that_is_missing_is_named():
-    with pytest.raises(NichechainError, match="birth 1 is the parent of another"):
+    with pytest.raises(NichechainError, match="has parent 1, but there is no such birth"):
         Triples.from_births(frame([row for row in FAMILY if row[:2] != (0, 1)]))
     with pytest.raises(NichechainError, match="no column depth"):
         Triples.from_births(frame(FAMILY).drop(columns="depth"))

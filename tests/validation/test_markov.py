@@ -203,9 +203,9 @@ def test_parents_of_one_niche_that_breed_differently_are_found():
 
 def test_numbers_out_of_range(triples):
     for test in TESTS.values():
-        with pytest.raises(NichechainError, match="permutations are 0"):
+        with pytest.raises(NichechainError, match="permutations is 0"):
             test(triples, permutations=0)
-    with pytest.raises(NichechainError, match="depth bins are 0"):
+    with pytest.raises(NichechainError, match="depth_bins is 0"):
         lineage_test(triples, depth_bins=0)
 
 

@@ -48,7 +48,7 @@ def test_one_generation_has_no_chapman_kolmogorov_of_lineages(arm):
         ({"lineages": 0}, "lineages is 0"),
         ({"l": 0}, "l is 0"),
         ({"offspring": 0}, "offspring is 0"),
-        ({"permutations": 0}, "permutations are 0"),
+        ({"permutations": 0}, "permutations is 0"),
         ({"seed": -1}, "seed is -1"),
     ],
 )
@@ -91,7 +91,7 @@ def test_workers_do_not_change_the_report(arm, tmp_path):
     [
         (["--elites", "1"], "elites is 1"),
         (["--l", "0"], "l is 0"),
-        (["--permutations", "-3"], "permutations are -3"),
+        (["--permutations", "-3"], "permutations is -3"),
         (["--workers", "0"], "workers is 0"),
     ],
 )

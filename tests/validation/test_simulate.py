@@ -56,8 +56,11 @@ def test_selection_makes_even_a_perfect_chain_break_the_square_of_t():
     seen, middle = np.zeros((12, 12)), np.zeros((12, 12))
     np.add.at(seen, (triples.grandparent[of], triples.child), 1)
     np.add.at(middle, (triples.grandparent[of], triples.niche[of]), 1)
-    seen, middle = seen / seen.sum(axis=1, keepdims=True), middle / middle.sum(axis=1, keepdims=True)
-    square = np.abs(seen - chain.T @ chain.T).sum(axis=1).mean() / 2
+    # Few elites ever replace others, so that some states are hardly anyone's grandparent's.
+    met = seen.sum(axis=1) > 2000
+    assert met.sum() > 6
+    seen, middle = (count[met] / count[met].sum(axis=1, keepdims=True) for count in (seen, middle))
+    square = np.abs(seen - chain.T[met] @ chain.T).sum(axis=1).mean() / 2
     weighted = np.abs(seen - middle @ chain.T).sum(axis=1).mean() / 2
     assert square > 0.1
     assert weighted < 0.03
@@ -87,5 +90,5 @@ def test_lineages_follow_powers_of_t():
 def test_bad_input_is_one_sentence(options, said):
     with pytest.raises(NichechainError, match=said):
         simulate_births(local_chain(), **{"births": 10, "rng": np.random.default_rng(), **options})
-    with pytest.raises(NichechainError, match="l is 0"):
+    with pytest.raises(NichechainError, match="generations is 0"):
         simulate_lineages(np.eye(2), [0], 0, np.random.default_rng())

@@ -118,10 +118,13 @@ def test_a_cube_is_the_same_in_every_layer():
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: Bound("sphere", 1.0), "kind 'sphere', but must be one of per-coordinate, rescaled"),
-        (lambda: Bound("rescaled", 0.0), "step bound is 0, but must be a positive number"),
-        (lambda: Bound("rescaled", math.inf), "step bound is inf"),
-        (lambda: Bound("per-coordinate", math.nan), "step bound is nan"),
+        (
+            lambda: Bound("sphere", 1.0),
+            "kind of step bound is 'sphere', but must be one of per-coordinate, rescaled",
+        ),
+        (lambda: Bound("rescaled", 0.0), "step_bound is 0.0, but must be a positive number"),
+        (lambda: Bound("rescaled", math.inf), "step_bound is inf"),
+        (lambda: Bound("per-coordinate", math.nan), "step_bound is nan"),
         (
             lambda: variation.make("uniform-ball", 1.0, bound=Bound("per-coordinate", 1.0)),
             "uniform-ball cannot be bounded per coordinate",
@@ -130,7 +133,7 @@ def test_a_cube_is_the_same_in_every_layer():
             lambda: AdditiveMutation(BallNoise(), 1.0, None, (3, 4), (1.0,)),
             r"layer scales are 1, but there are 2 layers \(3, 4 weights\): one scale per layer",
         ),
-        (lambda: AdditiveMutation(BallNoise(), 1.0, None, (3,), (0.0,)), "layer scale is 0"),
+        (lambda: AdditiveMutation(BallNoise(), 1.0, None, (3,), (0.0,)), "layer_scale is 0"),
         (
             lambda: AdditiveMutation(BallNoise(), 1.0, None, (3, 4), (1.0, 2.0))(
                 np.zeros(8), np.random.default_rng(0)

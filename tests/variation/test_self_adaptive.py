@@ -119,7 +119,7 @@ def test_an_archive_is_built_resumed_and_loaded(tmp_path):
     [
         (lambda: SelfAdaptiveMutation(GaussianNoise(), ()), r"layers are \(\), but each has at least"),
         (lambda: SelfAdaptiveMutation(GaussianNoise(), (3, 0)), r"layers are \(3, 0\)"),
-        (lambda: SelfAdaptiveDomain(PlanarArm(3), (1.0, -2.0)), "step size is -2"),
+        (lambda: SelfAdaptiveDomain(PlanarArm(3), (1.0, -2.0)), "step_size is -2"),
         (
             lambda: SelfAdaptiveMutation(GaussianNoise(), (3, 4))(np.zeros(7), np.random.default_rng(0)),
             "genotype has length 7, but 7 weights and 2 step sizes make 9",

@@ -85,7 +85,7 @@ def test_the_sum_is_rounded_once(name):
 @pytest.mark.parametrize("scale", [0.0, -1.0, np.nan, np.inf])
 @pytest.mark.parametrize("name", NAMES)
 def test_a_scale_must_be_positive(name, scale):
-    with pytest.raises(NichechainError, match="mutation scale is"):
+    with pytest.raises(NichechainError, match="scale is"):
         variation.make(name, scale)
 
 

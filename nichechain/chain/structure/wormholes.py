@@ -12,7 +12,7 @@ from scipy.special import betaincc
 from nichechain.chain.base_measure import BaseMeasure
 from nichechain.chain.counts import TransitionCounts
 from nichechain.chain.model import NicheChain
-from nichechain.core.checks import check_numbers
+from nichechain.core.checks import check_choice, check_numbers
 from nichechain.core.errors import NichechainError
 
 Floats = NDArray[np.float64]
@@ -71,8 +71,7 @@ def wormholes(
     semiparametric hierarchical mixture method". A pair's own births are left out of what is
     expected of it, or a rare jump would explain itself.
     """
-    if beyond not in get_args(Beyond):
-        raise NichechainError(f"beyond is {beyond!r}, but must be one of {', '.join(get_args(Beyond))}")
+    check_choice("beyond", beyond, get_args(Beyond))
     check_numbers(times=times, expected_false=expected_false)
     if not (np.isfinite(times) and times >= 1.0):
         raise NichechainError(f"times is {times}, but must be at least 1")

@@ -15,10 +15,14 @@ import numba
 import numpy as np
 
 from nichechain.domains.engine._call import call
+from nichechain.domains.engine.motions import code_of
 from nichechain.domains.engine.policy import forward
 
 # Positions in Functions.as_array.
-_STEP, _FORWARD, _COPY, _JAC_SITE, _ARCTAN2, _ARCTAN2_DATA, _MATMUL, _MATMUL_DATA = range(8)
+_STEP, _FORWARD, _COPY, _JAC_SITE, _GET_STATE, _SET_STATE = range(6)
+_ARCTAN2, _ARCTAN2_DATA, _MATMUL, _MATMUL_DATA = range(6, 10)
+# Position and orientation of the welded body end a snapshot.
+POSE = 7
 # mat2euler of gymnasium-robotics treats a smaller cosine as gimbal lock.
 _GIMBAL = np.finfo(np.float64).eps * 4.0
 
@@ -136,6 +140,23 @@ def _act(state: Any, action: Any, actuator_qpos: Any, ids: Any, blocked: Any) ->
 
 
 @numba.njit(nogil=True, cache=True)
+def _restore(c: Any, model: Any, data: Any, state: Any, ids: Any, parts: Any, snapshot: Any) -> None:
+    """What the next action and the steps after it read, as it was when the snapshot was taken."""
+    xpos, xquat = state[5][ids[6]], state[6][ids[6]]
+    call(c[_SET_STATE], (model, data, snapshot.ctypes.data, parts))
+    pose = snapshot[snapshot.size - POSE :]
+    xpos[:], xquat[:] = pose[:3], pose[3:]
+
+
+@numba.njit(nogil=True, cache=True)
+def _snapshot(c: Any, model: Any, data: Any, state: Any, ids: Any, parts: Any, out: Any) -> None:
+    """The reverse of :func:`_restore`."""
+    call(c[_GET_STATE], (model, data, out.ctypes.data, parts))
+    pose = out[out.size - POSE :]
+    pose[:3], pose[3:] = state[5][ids[6]], state[6][ids[6]]
+
+
+@numba.njit(nogil=True, cache=True)
 def run(
     c: Any,
     model: Any,
@@ -152,14 +173,19 @@ def run(
     activations: Any,
     observation_noise: Any,
     action_noise: Any,
+    known: Any,
+    snapshot: Any,
+    parts: Any,
     observations: Any,
     actions: Any,
+    codes: Any,
+    states: Any,
 ) -> None:
-    """Run one episode from the state ``start``, writing what was seen and done.
+    """Run one episode from the state ``start``, or the rest of it, writing what was seen and done.
 
     Parameters
     ----------
-    c : (8,) int64
+    c : (10,) int64
         ``Functions.as_array()``.
     model, data, start : int
         Addresses of the mjModel, of the mjData to use and of the mjData to start from.
@@ -183,18 +209,34 @@ def run(
         Added to what the policy sees; (0, inputs) for none.
     action_noise : (steps, outputs) float32
         Added to what the policy does; (0, outputs) for none.
+    known : int
+        Steps that are known already: their rows of ``observations`` and ``actions`` are there.
+    snapshot : (state,) float64
+        Where to go on from, if any are: the parts of the state, then the welded body's position and
+        orientation.
+    parts : int
+        Which parts of MuJoCo's state a snapshot holds, a sum of ``mjtState``.
     observations : (steps + 1, inputs) float64
         Written; the last row is what the environment returns after the last step.
     actions : (steps, outputs) float32
         Written.
+    codes : (steps,) int64
+        Written: :func:`nichechain.engine.motions.code_of` every action, and -1 from the first on
+        that has none.
+    states : (steps, state) float64
+        Written: snapshots after the actions with a code; (0, state) for none.
     """
     call(c[_COPY], (data, model, start))
     jac = np.empty((3, state[1].size))
     work = np.empty(16, np.int64)
     hidden = np.empty((2, sizes.max()), np.float32)
     seen = np.empty(observations.shape[1])
-    _observe(c, model, data, state, ids, dt, jac, work, observations[0])
-    for t in range(actions.shape[0]):
+    if known:
+        _restore(c, model, data, state, ids, parts, snapshot)
+    else:
+        _observe(c, model, data, state, ids, dt, jac, work, observations[0])
+    recorded = states.shape[0] > 0
+    for t in range(known, actions.shape[0]):
         if observation_noise.shape[0]:
             for j in range(seen.size):
                 seen[j] = observations[t, j] + observation_noise[t, j]
@@ -212,3 +254,7 @@ def run(
             state[0][ids[5]] = 0.0
             call(c[_FORWARD], (model, data))
         _observe(c, model, data, state, ids, dt, jac, work, observations[t + 1])
+        codes[t] = code_of(actions[t], blocked) if recorded else -1
+        recorded = codes[t] >= 0
+        if recorded:
+            _snapshot(c, model, data, state, ids, parts, states[t])

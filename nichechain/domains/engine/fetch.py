@@ -15,6 +15,8 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from nichechain.domains.engine.motions import Motions
+from nichechain.domains.memory import CACHE_MEMORY
 from nichechain.domains.policies.controllers import MLP, Controller
 
 if TYPE_CHECKING:
@@ -27,7 +29,7 @@ _FATAL_WARNINGS = ("CONTACTFULL", "CNSTRFULL", "BADQPOS", "BADQVEL", "BADQACC")
 
 
 @dataclass(frozen=True)
-class Episode:
+class Rollout:
     """What a policy saw and did.
 
     Parameters
@@ -37,11 +39,14 @@ class Episode:
     actions : (steps, 4) float32 array
     failure : str
         Why the physics cannot be trusted; empty where it can.
+    known : int
+        Steps whose physics was known from earlier episodes, so that it was not computed.
     """
 
     observations: NDArray[np.float64]
     actions: NDArray[np.float32]
     failure: str
+    known: int = 0
 
 
 @dataclass(frozen=True)
@@ -78,12 +83,14 @@ class FetchEpisodes(Protocol):
         genotype: NDArray[np.float32],
         steps: int,
         disturbance: Disturbance = UNDISTURBED,
-    ) -> Episode:
+    ) -> Rollout:
         """One episode; safe to call from several threads."""
         ...
 
 
-def fetch_episodes(env_id: str, seed: int, controller: Controller) -> FetchEpisodes:
+def fetch_episodes(
+    env_id: str, seed: int, controller: Controller, cache_memory: int = CACHE_MEMORY
+) -> FetchEpisodes:
     """The fastest way this machine has to run episodes of a Fetch environment.
 
     Parameters
@@ -94,11 +101,13 @@ def fetch_episodes(env_id: str, seed: int, controller: Controller) -> FetchEpiso
         Seed of the environment's reset.
     controller : Controller
         What will run: only an :class:`MLP` runs natively.
+    cache_memory : int
+        Bytes for the cache of motions of native episodes; 0 for none.
     """
     if not isinstance(controller, MLP):
         return SteppedFetch(env_id, seed)
     try:
-        return NativeFetch(env_id, seed)
+        return NativeFetch(env_id, seed, cache_memory)
     except (ImportError, OSError, AttributeError, RuntimeError) as error:
         warnings.warn(
             f"episodes are stepped through Gymnasium, which is slower: {error}", RuntimeWarning, stacklevel=2
@@ -130,7 +139,7 @@ class SteppedFetch:
         genotype: NDArray[np.float32],
         steps: int,
         disturbance: Disturbance = UNDISTURBED,
-    ) -> Episode:
+    ) -> Rollout:
         """One episode; every thread has an environment of its own."""
         policy = controller.policy(genotype)
         # list.pop and list.append are atomic, so the list is a pool without a lock.
@@ -151,7 +160,7 @@ class SteppedFetch:
             observations.append(observation["observation"])
         failure = physics_failure(env.unwrapped.data)
         self._idle.append(env)
-        return Episode(np.array(observations), actions, failure)
+        return Rollout(np.array(observations), actions, failure)
 
 
 class NativeFetch:
@@ -162,6 +171,8 @@ class NativeFetch:
     env_id : str
     seed : int
         Seed of the environment's reset.
+    cache_memory : int
+        Bytes for the cache of motions (see :mod:`nichechain.engine.motions`); 0 for none.
 
     Raises
     ------
@@ -169,7 +180,9 @@ class NativeFetch:
         If this machine lacks what the engine needs.
     """
 
-    def __init__(self, env_id: str, seed: int) -> None:
+    def __init__(self, env_id: str, seed: int, cache_memory: int = CACHE_MEMORY) -> None:
+        import mujoco
+
         from nichechain.domains.engine import episode, libraries
 
         if not _is_compiled(episode):
@@ -188,6 +201,15 @@ class NativeFetch:
         self._dt = float(unwrapped.dt)
         self._ids, self._actuator_qpos = _addresses(self._model, unwrapped._model_names.joint_names)
         self._idle: list[mujoco.MjData] = []
+        # The parts that the next step reads and does not set itself.
+        self._parts = int(mujoco.mjtState.mjSTATE_FULLPHYSICS | mujoco.mjtState.mjSTATE_WARMSTART)
+        self._state = mujoco.mj_stateSize(self._model, self._parts) + episode.POSE
+        self.motions: Motions | None = None
+        if cache_memory:
+            with contextlib.suppress(MemoryError):
+                self.motions = Motions(
+                    cache_memory, observation["observation"], self._state, blocked=self._blocked
+                )
 
     def run(
         self,
@@ -195,17 +217,29 @@ class NativeFetch:
         genotype: NDArray[np.float32],
         steps: int,
         disturbance: Disturbance = UNDISTURBED,
-    ) -> Episode:
+    ) -> Rollout:
         """One episode; every thread has an mjData of its own."""
         assert isinstance(controller, MLP)
         import mujoco
 
-        start = self._start if disturbance.shift is None else self._displaced(disturbance.shift)
-
-        # list.pop and list.append are atomic, so the list is a pool without a lock.
-        data = self._idle.pop() if self._idle else mujoco.MjData(self._model)
+        # What noise there was is not in the tree.
+        motions = self.motions if disturbance is UNDISTURBED else None
+        policy = controller.parameters(genotype), np.array(controller.sizes), controller.activations
         observations = np.empty((steps + 1, self.inputs))
         actions = np.empty((steps, controller.outputs), np.float32)
+        codes = np.empty(steps, np.int64)
+        snapshot = np.empty(self._state)
+        states = np.empty((0 if motions is None else steps, self._state))
+        known = 0
+        if motions is not None:
+            known = motions.walk(policy, observations, actions, codes, snapshot)
+        if steps and known == steps:
+            # Nothing is kept of an episode with warnings.
+            return Rollout(observations, actions, "", known)
+
+        start = self._start if disturbance.shift is None else self._displaced(disturbance.shift)
+        # list.pop and list.append are atomic, so the list is a pool without a lock.
+        data = self._idle.pop() if self._idle else mujoco.MjData(self._model)
         self._run(
             self._functions,
             self._model._address,
@@ -227,19 +261,24 @@ class NativeFetch:
             self._blocked,
             self._substeps,
             self._dt,
-            controller.parameters(genotype),
-            np.array(controller.sizes),
-            controller.activations,
+            *policy,
             np.empty((0, self.inputs)) if disturbance.observation is None else disturbance.observation,
             np.empty((0, controller.outputs), np.float32)
             if disturbance.action is None
             else disturbance.action,
+            known,
+            snapshot,
+            self._parts,
             observations,
             actions,
+            codes,
+            states,
         )
+        if motions is not None and not data.warning.number.any():
+            motions.insert(known, observations, codes, states)
         failure = physics_failure(data)
         self._idle.append(data)
-        return Episode(observations, actions, failure)
+        return Rollout(observations, actions, failure, known)
 
     def _displaced(self, shift: NDArray[np.float64]) -> mujoco.MjData:
         """The reset state with the block moved, as the environment's reset would place it."""

@@ -33,6 +33,8 @@ class Functions:
     mj_forward: int
     mj_copy_data: int
     mj_jac_site: int
+    mj_get_state: int
+    mj_set_state: int
     arctan2: int
     arctan2_data: int
     matmul: int
@@ -65,6 +67,8 @@ def load() -> Functions:
         mj_forward=address("mj_forward"),
         mj_copy_data=address("mj_copyData"),
         mj_jac_site=address("mj_jacSite"),
+        mj_get_state=address("mj_getState"),
+        mj_set_state=address("mj_setState"),
         arctan2=arctan2,
         arctan2_data=arctan2_data,
         matmul=matmul,

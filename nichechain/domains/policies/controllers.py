@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from nichechain.core.checks import as_floats, check_sample, check_whole, rng_of
+from nichechain.core.checks import as_floats, check_at_least, check_choice, check_whole, rng_of
 from nichechain.core.errors import NichechainError
 
 if TYPE_CHECKING:
@@ -130,8 +130,7 @@ class MLP:
                 f"but there are {len(self.sizes) - 2} hidden layers"
             )
         for name in self._names:
-            if name not in _ACTIVATIONS:
-                raise NichechainError(f"activation is {name!r}, but must be one of {', '.join(_ACTIVATIONS)}")
+            check_choice("activation", name, _ACTIVATIONS)
 
     @classmethod
     def of(cls, module: nn.Module, *, evolve_biases: bool = False) -> MLP | None:
@@ -271,7 +270,7 @@ class MLP:
         """
         import torch
 
-        check_sample(n)
+        check_at_least(0, n=n)
         generator = torch.Generator().manual_seed(int(rng_of(seed).integers(2**63)))
         genotypes = np.empty((n, self.genotype_length), np.float32)
         for row in genotypes:
@@ -348,7 +347,7 @@ class ModuleController:
         """
         import torch
 
-        check_sample(n)
+        check_at_least(0, n=n)
         generator = torch.Generator().manual_seed(int(rng_of(seed).integers(2**63)))
         genotypes = np.zeros((n, self.genotype_length), np.float32)
         for row in genotypes:

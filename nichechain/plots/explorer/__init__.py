@@ -9,8 +9,7 @@ from __future__ import annotations
 
 import base64
 import json
-import os
-from dataclasses import dataclass
+from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -20,11 +19,14 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from nichechain.chain.displacement import GridDisplacement
+from nichechain.chain.operator import PooledTransition
 from nichechain.chain.structure.graph import LONG_JUMP
 from nichechain.chain.structure.wormholes import wormholes
 from nichechain.core.errors import NichechainError
+from nichechain.core.files import write_atomically
 from nichechain.evolvability.coverage import coverage_by_generation
 from nichechain.evolvability.question import Question
+from nichechain.evolvability.returns import all_return_probabilities
 from nichechain.niches import GridNiches
 
 if TYPE_CHECKING:
@@ -32,7 +34,6 @@ if TYPE_CHECKING:
     from nichechain.chain import NicheChain
 
 Floats = NDArray[np.float64]
-Floats32 = NDArray[np.float32]
 
 LONGEST = 10
 """Generations that the page's slider goes up to."""
@@ -44,89 +45,6 @@ _STATES = 4_000
 # Numbers of lineages that intervals are computed for, besides the one asked for.
 _LINEAGES = (10, 1000)
 _MOST_LINEAGES = 10_000
-
-
-@dataclass(frozen=True)
-class CompactTransition:
-    """T as a page keeps it, exact: what births say one by one, what all rows share once.
-
-    T_ij is ``kept[i, j] + rest[i] * pool[j] + spread[i] * kernel[displacement from i to j]``, the
-    last between niches only; the mean of a posterior has just these parts.
-
-    Parameters
-    ----------
-    kept : (S, S) scipy.sparse.csr_array of float32
-    rest, pool, spread : (S,) float32 arrays
-    kernel : (2 k - 1, 2 m - 1) float32 array
-        For a grid of k by m niches.
-    """
-
-    kept: sparse.csr_array
-    rest: Floats32
-    pool: Floats32
-    spread: Floats32
-    kernel: Floats32
-
-    @classmethod
-    def of(cls, chain: NicheChain) -> CompactTransition:
-        """The transition matrix of a chain, its posterior mean where it is estimated with one."""
-        assert isinstance(chain.niches, GridNiches)
-        states, n = chain.states, chain.n_niches
-        rest, spread = np.zeros(states), np.zeros(states)
-        if chain.posterior is None:
-            kernel = np.zeros(tuple(2 * k - 1 for k in chain.niches.shape))
-            return cls._narrow(sparse.csr_array(chain.T), rest, np.zeros(states), spread, kernel)
-        posterior, base = chain.posterior, chain.posterior.base
-        assert isinstance(base.displacement, GridDisplacement)
-        kernel = base.displacement.kernel
-        known = np.asarray(posterior.weights.sum(axis=1)).ravel()
-        prior = posterior.strength / (known + posterior.strength)
-        kept = (sparse.diags_array(1.0 / (known + posterior.strength)) @ posterior.weights).tolil()
-        anywhere, displaced, uniform = base.weights
-        shared = anywhere * base.destination + uniform / states
-        rest[:n] = prior[:n] * shared.sum()
-        spread[:n] = prior[:n] * displaced * (1.0 - base.leaving) / base.within
-        if states > n:
-            if displaced * base.leaving > 0:
-                kept[:n, n] = kept[:n, [n]].toarray().ravel() + prior[:n] * displaced * base.leaving
-            # Nothing is displaced from outside: that row has a prior of its own.
-            kept[[n]] = posterior.mean()[[n]]
-        return cls._narrow(kept.tocsr(), rest, shared / shared.sum(), spread, kernel)
-
-    @classmethod
-    def _narrow(
-        cls, kept: sparse.csr_array, rest: Floats, pool: Floats, spread: Floats, kernel: Floats
-    ) -> CompactTransition:
-        narrow = kept.astype(np.float32)
-        narrow.eliminate_zeros()
-        narrow.sort_indices()
-        return cls(narrow, *(part.astype(np.float32) for part in (rest, pool, spread, kernel)))
-
-    def toarray(self) -> Floats:
-        """The matrix, (S, S)."""
-        whole: Floats = self.kept.toarray().astype(np.float64)
-        whole += np.outer(self.rest.astype(np.float64), self.pool.astype(np.float64))
-        columns, rows = ((side + 1) // 2 for side in self.kernel.shape)
-        i, j = np.divmod(np.arange(columns * rows), rows)
-        for niche in np.flatnonzero(self.spread[: i.size]):
-            displaced = self.kernel[i - i[niche] + columns - 1, j - j[niche] + rows - 1].astype(np.float64)
-            whole[niche, : i.size] += float(self.spread[niche]) * displaced
-        return whole
-
-    def returns(self, steps: int) -> Floats:
-        """Probabilities (T^k)_jj of being back in a state after k = 1 … ``steps``, (steps, S).
-
-        With them the page needs no more than the powers' product with one row: a visit at step k
-        is a first visit at some step i and a return after k − i (the renewal equation).
-        """
-        one = self.toarray()
-        powers = [np.eye(len(one)), one]
-        for _ in range(2, (steps + 1) // 2 + 1):
-            powers.append(powers[-1] @ one)
-        # (T^(a+b))_jj = Σ_i (T^a)_ji (T^b)_ij: half the powers are enough.
-        return np.array(
-            [np.einsum("ij,ji->i", powers[(k + 1) // 2], powers[k // 2]) for k in range(1, steps + 1)]
-        )
 
 
 def write_explorer(
@@ -160,15 +78,7 @@ def write_explorer(
         If a number is out of range, behavior does not have two axes, or there are too many niches.
     """
     text = explorer_page(archive, chain, l=l, lineages=lineages, draws=draws, seed=seed)
-    part = out.with_name(out.name + ".tmp")
-    try:
-        with part.open("w", encoding="utf-8", newline="\n") as file:
-            file.write(text)
-            file.flush()
-            os.fsync(file.fileno())
-        part.replace(out)
-    finally:
-        part.unlink(missing_ok=True)
+    write_atomically(out, text.encode())
 
 
 def explorer_page(
@@ -254,17 +164,45 @@ def _elites(archive: Archive) -> dict[str, Any]:
     return {"elites": _packed(found, np.float64)}
 
 
+def rounded_transition(chain: NicheChain) -> PooledTransition:
+    """T as the page keeps it: in parts, each rounded to single precision."""
+    whole = chain.operator
+    if not isinstance(whole, PooledTransition):
+        nothing = np.zeros(chain.states)
+        whole = PooledTransition.shared(sparse.csr_array(whole), nothing, nothing)
+    kept = whole.kept.astype(np.float32).astype(np.float64)
+    kept.eliminate_zeros()
+    kept.sort_indices()
+    displacement = whole.displacement
+    if displacement is not None:
+        assert isinstance(displacement, GridDisplacement)
+        displacement = replace(displacement, kernel=_rounded(displacement.kernel))
+    return replace(
+        whole,
+        kept=kept,
+        shares=_rounded(whole.shares),
+        pools=_rounded(whole.pools),
+        spread=_rounded(whole.spread),
+        displacement=displacement,
+    )
+
+
+def _rounded(values: Floats) -> Floats:
+    return values.astype(np.float32).astype(np.float64)
+
+
 def _transition(chain: NicheChain) -> dict[str, Any]:
-    compact = CompactTransition.of(chain)
+    T = rounded_transition(chain)
+    kernel = T.displacement.kernel if isinstance(T.displacement, GridDisplacement) else np.zeros(0)
     return {
-        "rowStart": _packed(compact.kept.indptr, np.uint32),
-        "column": _packed(compact.kept.indices, np.uint16),
-        "probability": _packed(compact.kept.data, np.float32),
-        "rest": _packed(compact.rest, np.float32),
-        "pool": _packed(compact.pool, np.float32),
-        "spread": _packed(compact.spread, np.float32),
-        "kernel": _packed(compact.kernel, np.float32),
-        "returns": _packed(compact.returns(LONGEST - 1), np.float64),
+        "rowStart": _packed(T.kept.indptr, np.uint32),
+        "column": _packed(T.kept.indices, np.uint16),
+        "probability": _packed(T.kept.data, np.float32),
+        "shares": _packed(T.shares, np.float32),
+        "pools": _packed(T.pools, np.float32),
+        "spread": _packed(T.spread, np.float32),
+        "kernel": _packed(kernel, np.float32),
+        "returns": _packed(all_return_probabilities(T.toarray(), LONGEST - 1), np.float64),
     }
 
 

@@ -13,8 +13,8 @@ const T = {
   start: unpack(data.rowStart, Uint32Array),
   column: unpack(data.column, Uint16Array),
   probability: unpack(data.probability, Float32Array),
-  rest: unpack(data.rest, Float32Array),
-  pool: unpack(data.pool, Float32Array),
+  shares: unpack(data.shares, Float32Array),
+  pools: unpack(data.pools, Float32Array),
   spread: unpack(data.spread, Float32Array),
   kernel: unpack(data.kernel, Float32Array),
 };
@@ -49,9 +49,13 @@ const distance = (a, b) => Math.hypot(center(a)[0] - center(b)[0], center(a)[1] 
  * births say, where children land anywhere, and how far they land from their parents.
  */
 function advance(here) {
-  let pooled = 0;
-  for (let i = 0; i < S; i++) pooled += here[i] * T.rest[i];
-  const there = Float64Array.from(T.pool, (share) => share * pooled);
+  const there = new Float64Array(S);
+  const pools = T.pools.length / S;
+  for (let pool = 0; pool < pools; pool++) {
+    let pooled = 0;
+    for (let i = 0; i < S; i++) pooled += here[i] * T.shares[i * pools + pool];
+    for (let j = 0; j < S; j++) there[j] += pooled * T.pools[pool * S + j];
+  }
   for (let i = 0; i < S; i++) {
     if (here[i] === 0) continue;
     for (let k = T.start[i]; k < T.start[i + 1]; k++) there[T.column[k]] += here[i] * T.probability[k];

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from nichechain.core.errors import NichechainError
+from nichechain.core.checks import check_choice
 from nichechain.walks.diversity.kernel import KernelDensity, kernel_density
 from nichechain.walks.diversity.metrics import (
     AncestorDistance,
@@ -58,6 +58,5 @@ def make(name: str) -> Metric:
     NichechainError
         If there is none.
     """
-    if name not in _METRICS:
-        raise NichechainError(f"metric is {name!r}, but must be one of {', '.join(_METRICS)}")
+    check_choice("metric", name, _METRICS)
     return _METRICS[name]()

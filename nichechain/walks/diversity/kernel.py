@@ -18,7 +18,7 @@ from nichechain.core.arrays import (
     present,
     squared_distances,
 )
-from nichechain.core.checks import as_floats, check_numbers
+from nichechain.core.checks import as_floats, check_choice, check_positive, check_share
 from nichechain.core.errors import NichechainError
 
 if TYPE_CHECKING:
@@ -62,18 +62,12 @@ class KernelDensity:
     archive: bool = True
 
     def __post_init__(self) -> None:
-        if self.mode not in get_args(Mode):
-            raise NichechainError(f"mode is {self.mode!r}, but must be one of {', '.join(get_args(Mode))}")
-        check_numbers(decay=self.decay)
-        if not 0 < self.decay <= 1:
-            raise NichechainError(f"decay is {self.decay}, but must be above 0 and at most 1")
+        check_choice("mode", self.mode, get_args(Mode))
+        check_share(decay=self.decay)
         if self.mode == "matrix":
             _check_matrix(as_floats("bandwidth matrix", self.bandwidth))
             return
-        if not isinstance(self.bandwidth, tuple):
-            check_numbers(bandwidth=self.bandwidth)
-        if isinstance(self.bandwidth, tuple) or not 0 < float(self.bandwidth) < math.inf:
-            raise NichechainError(f"bandwidth is {self.bandwidth}, but must be a positive number")
+        check_positive(bandwidth=self.bandwidth)
 
     @property
     def remembers(self) -> bool:

@@ -22,7 +22,7 @@ from nichechain.core.arrays import (
     present,
     squared_distances,
 )
-from nichechain.core.checks import as_floats, as_whole, check_whole
+from nichechain.core.checks import as_floats, as_whole, check_at_least
 from nichechain.core.errors import NichechainError
 
 Floats = NDArray[np.float64]
@@ -111,7 +111,7 @@ class KNearest:
     include_itself: bool = False
 
     def __post_init__(self) -> None:
-        _check_neighbours(self.k)
+        check_at_least(1, k=self.k)
 
     @property
     def remembers(self) -> bool:
@@ -183,7 +183,7 @@ def knn_distance(query: ArrayLike, pool: ArrayLike, k: int, *, itself: ArrayLike
     Source: Eq. 17 of the paper, after Lehman and Stanley (2011). Large populations are searched
     with one k-d tree per walk.
     """
-    _check_neighbours(k)
+    check_at_least(1, k=k)
     points, others = checked_points(query, pool)
     walks, queries, _ = points.shape
     own = checked_own(itself, points, others)
@@ -275,9 +275,3 @@ def _by_tree(points: Floats, others: Floats, k: int, own: Ints) -> Floats:
     left_out = own[finite] >= 0
     score[finite] = ordered_sum(np.where(left_out[:, None], distance[:, 1:], distance[:, :-1]))
     return score
-
-
-def _check_neighbours(k: int) -> None:
-    check_whole(k=k)
-    if k < 1:
-        raise NichechainError(f"k is {k}, but a behavior needs at least 1 neighbour")

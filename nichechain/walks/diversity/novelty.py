@@ -8,7 +8,7 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from nichechain.core.checks import check_numbers, check_whole
+from nichechain.core.checks import check_at_least, check_share
 from nichechain.core.errors import NichechainError
 
 Floats = NDArray[np.float64]
@@ -56,19 +56,11 @@ class ArchiveRule:
     scope: Scope = "walk"
 
     def __post_init__(self) -> None:
-        check_whole(limit=self.limit)
+        check_at_least(1, archive_limit=self.limit)
         if self.probability is not None:
-            check_numbers(probability=self.probability)
+            check_share(archive_probability=self.probability)
         if self.count is not None:
-            check_whole(count=self.count)
-        if self.limit < 1:
-            raise NichechainError(f"archive limit is {self.limit}, but must be at least 1")
-        if self.probability is not None and not 0 < self.probability <= 1:
-            raise NichechainError(
-                f"archive probability is {self.probability}, but must be above 0 and at most 1"
-            )
-        if self.count is not None and self.count < 1:
-            raise NichechainError(f"archive count is {self.count}, but must be at least 1")
+            check_at_least(1, archive_count=self.count)
         if self.count is not None and self.probability is not None:
             raise NichechainError(
                 f"archive count {self.count} and probability {self.probability} exclude each other: "

@@ -16,7 +16,7 @@ from nichechain.archive import read, write
 from nichechain.archive.archive import load
 from nichechain.archive.build import build
 from nichechain.core.errors import ArchiveError
-from nichechain.core.locking import writing
+from nichechain.core.files import writing
 from nichechain.execution import Threads
 
 from .samples import (
@@ -45,7 +45,7 @@ def test_a_second_writer_is_refused(pristine: dict[str, bytes], tmp_path: Path) 
 
 def test_a_killed_writer_lets_go(tmp_path: Path) -> None:
     code = (
-        "import sys, time; from pathlib import Path; from nichechain.core.locking import writing\n"
+        "import sys, time; from pathlib import Path; from nichechain.core.files import writing\n"
         "with writing(Path(sys.argv[1])): print('held', flush=True); time.sleep(60)"
     )
     with subprocess.Popen(

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from nichechain.domains import FetchPickAndPlace
 from nichechain.domains.engine import libraries
-from nichechain.domains.engine.fetch import Episode, NativeFetch, SteppedFetch, fetch_episodes
+from nichechain.domains.engine.fetch import NativeFetch, Rollout, SteppedFetch, fetch_episodes
 from nichechain.domains.policies.controllers import MLP
 
 gymnasium.register_envs(gymnasium_robotics)
@@ -60,7 +60,7 @@ def policies(mlp: MLP, n: int, seed: int) -> NDArray[np.float32]:
     return genotypes.astype(np.float32)
 
 
-def stepped(env: Any, seed: int, mlp: MLP, genotype: NDArray[np.float32]) -> Episode:
+def stepped(env: Any, seed: int, mlp: MLP, genotype: NDArray[np.float32]) -> Rollout:
     """The same episode as a user of Gymnasium would write it."""
     observation, _ = env.reset(seed=seed)
     observations, actions = [observation["observation"]], []
@@ -68,10 +68,10 @@ def stepped(env: Any, seed: int, mlp: MLP, genotype: NDArray[np.float32]) -> Epi
         actions.append(mlp.actions(genotype, observations[-1][None])[0])
         observation, *_ = env.step(actions[-1])
         observations.append(observation["observation"])
-    return Episode(np.array(observations), np.array(actions), "")
+    return Rollout(np.array(observations), np.array(actions), "")
 
 
-def assert_same_bits(ours: Episode, theirs: Episode) -> None:
+def assert_same_bits(ours: Rollout, theirs: Rollout) -> None:
     assert ours.failure == ""
     assert ours.observations.shape == (STEPS + 1, theirs.observations.shape[1])
     assert ours.actions.shape == (STEPS, 4)

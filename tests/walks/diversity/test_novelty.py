@@ -69,10 +69,10 @@ def test_by_chance_each_enters_on_its_own():
 @pytest.mark.parametrize(
     ("values", "message"),
     [
-        ({"limit": 0}, "archive limit is 0"),
-        ({"probability": 0.0}, "archive probability is 0.0"),
-        ({"probability": 1.5}, "archive probability is 1.5"),
-        ({"count": 0}, "archive count is 0"),
+        ({"limit": 0}, "archive_limit is 0"),
+        ({"probability": 0.0}, "archive_probability is 0.0"),
+        ({"probability": 1.5}, "archive_probability is 1.5"),
+        ({"count": 0}, "archive_count is 0"),
         ({"count": 6, "probability": 0.1}, "exclude each other"),
         ({"entry": "all"}, "archive entry is 'all', but must be offspring or selected"),
         ({"scope": "run"}, "archive scope is 'run', but must be walk or configuration"),

@@ -1,4 +1,4 @@
-"""Cells of a pyribs archive as niches, and back."""
+"""Niches as the cells of a pyribs archive, and back."""
 
 from __future__ import annotations
 
@@ -7,7 +7,9 @@ from typing import Any
 import numpy as np
 
 from nichechain.core.errors import NichechainError
-from nichechain.niches import CVTNiches, GridNiches, Niches
+from nichechain.niches.base import Niches
+from nichechain.niches.cvt import CVTNiches
+from nichechain.niches.grid import GridNiches
 
 
 def niches_of(archive: Any, outside: str) -> Niches:
@@ -49,6 +51,7 @@ def empty_archive(niches: Niches, **options: Any) -> Any:
     NichechainError
         If the niches are of a kind that pyribs does not have.
     """
+    # Importing pyribs takes seconds, which only a search should spend.
     from ribs.archives import CVTArchive, GridArchive
 
     match niches:
@@ -57,4 +60,4 @@ def empty_archive(niches: Niches, **options: Any) -> Any:
         case CVTNiches():
             return CVTArchive(centroids=niches.centroids, ranges=niches.bounds, **options)
         case _:
-            raise NichechainError(f"niches are {niches!r}, but pyribs has grids and tessellations only")
+            raise NichechainError(f"niches are {niches!r}, but pyribs has an archive for grid and cvt only")
