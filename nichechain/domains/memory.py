@@ -7,7 +7,7 @@ from typing import Any
 
 from nichechain.core.checks import check_whole
 from nichechain.core.errors import NichechainError
-from nichechain.domains.wrapper import Wrapper
+from nichechain.domains.base import Wrapper
 
 CACHE_MEMORY = 2 * 2**30
 """Bytes of the cache of a process, unless told otherwise: suits 24 GiB and what else runs there."""
