@@ -14,7 +14,7 @@ from nichechain.search.config import MOST_FAILED
 
 
 @dataclass(frozen=True)
-class Calibrate:
+class CalibrateCommand:
     """Add births of unselected lineages to a finished archive: they show what lineages do.
 
     Lineages begin at elites drawn alike, so births go where lineages stand: most to the niches that
@@ -27,6 +27,9 @@ class Calibrate:
     """How many births to add, such as 2000."""
     workers: Annotated[str | None, console.option("WORKERS", "one thread per processor")] = None
     """Who evaluates: a number of threads, processes:N, ray or ray://HOST:PORT. The result is the same."""
+    cache_memory: Annotated[str | None, console.option("SIZE", "2GiB")] = None
+    """Memory on each machine for physics that was computed before, such as 500MB, or 0 for none. The result
+    is the same."""
     max_failed: float = MOST_FAILED
     """Share of these births that may fail, from 0 to 1, before it is stopped."""
     resume: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
@@ -35,7 +38,7 @@ class Calibrate:
 
 def run(arguments: Sequence[str]) -> int:
     """Calibrate, then say what came of it."""
-    command = console.parse(Calibrate, arguments)
+    command = console.parse(CalibrateCommand, arguments)
     from nichechain import execution
     from nichechain.archive import read
     from nichechain.archive.archive import load
@@ -46,7 +49,7 @@ def run(arguments: Sequence[str]) -> int:
     end = before.births + (command.rollouts or 0)
     if command.resume and before.calibrations:
         end = before.calibrations[-1].end
-    with execution.make(command.workers) as executor:
+    with execution.make(command.workers, command.cache_memory) as executor:
         try:
             with console.build_progress(end) as tell:
                 calibrate(

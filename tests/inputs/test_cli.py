@@ -99,12 +99,13 @@ TABLE: tuple[tuple[str, str, tuple[str, ...], Bad], ...] = (
     ),
     (
         "calibrate",
-        "Calibrate",
+        "CalibrateCommand",
         ("{spare}", "--rollouts", "4"),
         {
             "path": (*_PATH, "{imported}", "{merged}", "{unfinished}"),
             "rollouts": _COUNT,
             "workers": _WORKERS,
+            "cache_memory": _MEMORY,
             "max_failed": _SHARE,
         },
     ),
