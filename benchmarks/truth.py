@@ -53,7 +53,7 @@ def main() -> None:
     )
     parser.add_argument("verb", choices=("make", "score", "report"))
     parser.add_argument(
-        "--folder", type=Path, default=Path("truth"), help="where data sets and scores are kept"
+        "--folder", type=Path, default=Path("build/truth"), help="where data sets and scores are kept"
     )
     parser.add_argument("--only", nargs="+", choices=tuple(DATASETS), help="these data sets")
     parser.add_argument("--held-out", action="store_true", help="those held out as well")

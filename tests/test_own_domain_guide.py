@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from nichechain.cli.build import BuildCommand
-from nichechain.cli.console import parse
+from nichechain.cli.parsing import parse
 from nichechain.search.making import make_domain
 
 GUIDE = Path(__file__).parents[1] / "docs" / "own_domain.md"

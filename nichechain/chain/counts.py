@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
+from nichechain.births.families import tabulated
 from nichechain.births.table import NONE
 from nichechain.core.checks import as_floats, as_whole
 from nichechain.core.errors import NichechainError
@@ -73,8 +74,7 @@ class TransitionCounts:
             raise NichechainError(f"elites have shape {uid.shape} and parents {i.shape}, but must be alike")
         # Children whose parents are not known are not siblings for that.
         own = moved & (uid != NONE)
-        kinds, size = np.unique(np.stack([i[own], uid[own], j[own]]), axis=1, return_counts=True)
-        return replace(counts, families=np.vstack([kinds, size]).T)
+        return replace(counts, families=tabulated(i[own], uid[own], j[own]))
 
     @classmethod
     def from_pairs(

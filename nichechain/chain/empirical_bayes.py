@@ -12,12 +12,13 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
 from scipy.optimize import minimize
 from scipy.special import softmax
 
+from nichechain.births.families import elites_of
 from nichechain.chain.base_measure import BaseMeasure
 from nichechain.chain.counts import TransitionCounts
+from nichechain.chain.families import orphans_of
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -143,40 +144,31 @@ class _LeftOut:
 
 def _left_out(counts: TransitionCounts) -> _LeftOut:
     """Every elite's children; births that do not say whose they are count as their own families."""
-    parent, elite, child, children = counts.families.T
-    _, number = np.unique(np.stack([parent, elite]), axis=1, return_inverse=True)
-    number = number.ravel()
-    family = np.bincount(number, children).astype(np.int64)[number] if number.size else number
-    known = _as_matrix(counts, counts.families)
-    orphans = (counts.matrix - known).tocoo()
-    some = orphans.data > 0
-    alone = np.ones(int(some.sum()), np.int64)
+    parent, _, child, children = counts.families.T
+    elite = elites_of(counts.families)
+    family = np.bincount(elite, children).astype(np.int64)[elite]
+    stray, landed, number = orphans_of(counts)
+    alone = np.ones_like(number)
     return _LeftOut(
-        np.concatenate([parent, orphans.coords[0][some]]).astype(np.int64),
-        np.concatenate([child, orphans.coords[1][some]]).astype(np.int64),
+        np.concatenate([parent, stray]),
+        np.concatenate([child, landed]),
         np.concatenate([children, alone]),
         np.concatenate([family, alone]),
-        np.concatenate([children, orphans.data[some]]),
+        np.concatenate([children, number]),
     )
 
 
 def _siblings(counts: TransitionCounts) -> tuple[Ints, Ints]:
     """Ordered pairs of children of one elite, and those of them in one niche, (S,) each."""
     states = counts.niches.states
-    parent, elite, _, children = counts.families.T
-    owners, number = np.unique(np.stack([parent, elite]), axis=1, return_inverse=True)
-    if not number.size:
-        return np.zeros(states, np.int64), np.zeros(states, np.int64)
-    family = np.bincount(number.ravel(), children)
-    pairs = np.bincount(owners[0], family * (family - 1), states)
+    parent, _, _, children = counts.families.T
+    elite = elites_of(counts.families)
+    family = np.bincount(elite, children)
+    owner = np.empty(family.size, np.int64)
+    owner[elite] = parent
+    pairs = np.bincount(owner, family * (family - 1), states)
     matches = np.bincount(parent, children * (children - 1), states)
     return pairs.astype(np.int64), matches.astype(np.int64)
-
-
-def _as_matrix(counts: TransitionCounts, families: Ints) -> sparse.csr_array:
-    """Counts of some families, (S, S)."""
-    index = families[:, 0], families[:, 2]
-    return sparse.coo_array((families[:, 3], index), shape=counts.matrix.shape).tocsr()
 
 
 def _without_own(counts: TransitionCounts, parent: Ints, child: Ints) -> Floats:

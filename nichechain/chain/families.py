@@ -4,21 +4,29 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 
 from nichechain.chain.counts import TransitionCounts
 
 Ints = NDArray[np.int64]
 
 
+def orphans_of(counts: TransitionCounts) -> tuple[Ints, Ints, Ints]:
+    """Births that do not say whose they are: states of parent and child, and how many, (E,) each."""
+    index = counts.families[:, 0], counts.families[:, 2]
+    known = sparse.coo_array((counts.families[:, 3], index), shape=counts.matrix.shape).tocsr()
+    left = (counts.matrix - known).tocoo()
+    some = left.data > 0
+    parent, child = (axis[some].astype(np.int64) for axis in left.coords)
+    return parent, child, left.data[some]
+
+
 def families_of(counts: TransitionCounts) -> Ints:
     """Rows (state, elite, child, children); children of nobody in particular are elites' only ones."""
-    known = TransitionCounts.from_pairs(
-        counts.families[:, 0], counts.families[:, 2], counts.niches, counts.families[:, 3]
-    )
-    orphans = (counts.matrix - known.matrix).tocoo()
-    parent, child = (np.repeat(axis, orphans.data) for axis in orphans.coords)
-    number = counts.families[:, 1].max(initial=-1) + 1 + np.arange(parent.size)
-    alone = np.stack([parent, number, child, np.ones_like(number)], axis=1)
+    *states, number = orphans_of(counts)
+    parent, child = (np.repeat(axis, number) for axis in states)
+    elite = counts.families[:, 1].max(initial=-1) + 1 + np.arange(parent.size)
+    alone = np.stack([parent, elite, child, np.ones_like(elite)], axis=1)
     return np.concatenate([counts.families, alone]).astype(np.int64)
 
 

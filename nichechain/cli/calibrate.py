@@ -9,7 +9,7 @@ from typing import Annotated
 
 import tyro
 
-from nichechain.cli import console
+from nichechain.cli import output, parsing, progress
 from nichechain.search.config import MOST_FAILED
 
 
@@ -23,35 +23,32 @@ class CalibrateCommand:
 
     path: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="PATH")]
     """Archive folder."""
-    rollouts: Annotated[int | None, console.option("N", "none")] = None
+    rollouts: Annotated[int | None, parsing.option("N", "none")] = None
     """How many births to add, such as 2000."""
-    workers: Annotated[str | None, console.option("WORKERS", "one thread per processor")] = None
-    """Who evaluates: a number of threads, processes:N, ray or ray://HOST:PORT. The result is the same."""
-    cache_memory: Annotated[str | None, console.option("SIZE", "2GiB")] = None
-    """Memory on each machine for physics that was computed before, such as 500MB, or 0 for none. The result
-    is the same."""
+    workers: parsing.Workers = None
+    cache_memory: parsing.CacheMemory = None
     max_failed: float = MOST_FAILED
     """Share of these births that may fail, from 0 to 1, before it is stopped."""
-    resume: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
+    resume: bool = False
     """Go on with a calibration that was stopped, in place of --rollouts."""
 
 
 def run(arguments: Sequence[str]) -> int:
     """Calibrate, then say what came of it."""
-    command = console.parse(CalibrateCommand, arguments)
+    command = parsing.parse(CalibrateCommand, arguments)
     from nichechain import execution
     from nichechain.archive import read
     from nichechain.archive.archive import load
     from nichechain.archive.calibrate import calibrate
 
-    shown = console.console()
+    shown = output.console()
     before = read.read_meta(command.path)
     end = before.births + (command.rollouts or 0)
     if command.resume and before.calibrations:
         end = before.calibrations[-1].end
     with execution.make(command.workers, command.cache_memory) as executor:
         try:
-            with console.build_progress(end) as tell:
+            with progress.build_progress(end) as tell:
                 calibrate(
                     command.path,
                     command.rollouts,
@@ -61,7 +58,7 @@ def run(arguments: Sequence[str]) -> int:
                     max_failed=command.max_failed,
                 )
         except KeyboardInterrupt:
-            console.leave_at_next_interrupt()
+            progress.leave_at_next_interrupt()
             kept = read.read_meta(command.path)
             if kept.births == before.births:
                 shown.print("Stopped; no births were added.")
@@ -81,5 +78,5 @@ def run(arguments: Sequence[str]) -> int:
         "rows of T observed": f"{archive.counts.rows_observed} of {len(archive.niches)}",
         "archive": str(command.path),
     }
-    shown.print(console.facts(rows))
+    shown.print(output.facts(rows))
     return 0

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
-from nichechain.cli import console
+from nichechain.cli import output, parsing, progress
 from nichechain.core.checks import check_at_least
 from nichechain.core.errors import NichechainError
 
@@ -49,7 +49,7 @@ class CompareCommand:
 
 def run(arguments: Sequence[str]) -> int:
     """Compare."""
-    command = console.parse(CompareCommand, arguments)
+    command = parsing.parse(CompareCommand, arguments)
     from nichechain.archive import read
     from nichechain.archive.archive import load
     from nichechain.evolvability.question import Question
@@ -64,7 +64,7 @@ def run(arguments: Sequence[str]) -> int:
             "bounds and outside"
         )
     births = [read.read_births(archive.folder, archive.meta) for archive in archives]
-    with console.spinner("resampling"):
+    with progress.spinner("resampling"):
         found = contrast(
             births[0],
             births[1],
@@ -86,12 +86,12 @@ def run(arguments: Sequence[str]) -> int:
 
 
 def _show(found: Contrast) -> None:
-    shown = console.console()
+    shown = output.console()
     shown.print(
         f"[bold]B against A[/] in niches; evolvability and reach after {found.l} generations, "
         f"over {found.niches} niches with {found.min_births} births in both"
     )
-    table = console.table("niches", "A", "B", "B − A", "90 % interval")
+    table = output.table("niches", "A", "B", "B − A", "90 % interval")
     for row in found.rows:
         name = _NAMES[row.figure].format(lineages=found.lineages, births=found.births)
         interval = f"{row.low:+.2f} to {row.high:+.2f}"

@@ -10,7 +10,7 @@ from typing import Annotated, Literal, get_args, get_type_hints
 
 import tyro
 
-from nichechain.cli import COMMANDS, console
+from nichechain.cli import COMMANDS, parsing
 
 _BASH = """_nichechain() {{
     local word="${{COMP_WORDS[COMP_CWORD]}}" options
@@ -35,7 +35,7 @@ class CompletionCommand:
 
 def run(arguments: Sequence[str]) -> int:
     """Write the script."""
-    shell = console.parse(CompletionCommand, arguments).shell
+    shell = parsing.parse(CompletionCommand, arguments).shell
     words = {command: list(_words(command)) for command in COMMANDS}
     if shell == "fish":
         print(_fish(words))
@@ -59,7 +59,7 @@ def _words(command: str) -> Iterator[str]:
         if isinstance(value, type) and is_dataclass(value) and value.__module__ == module.__name__
     ]
     if command == "walks":
-        yield from (console.called(each) for each in made if not each.__name__.startswith("_"))
+        yield from (parsing.called(each) for each in made if not each.__name__.startswith("_"))
     seen: set[str] = set()
     for each in made:
         hints = get_type_hints(each, include_extras=True)

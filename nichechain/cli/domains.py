@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import tyro
 
-from nichechain.cli import console
+from nichechain.cli import output, parsing, progress
 
 if TYPE_CHECKING:
     from nichechain.domains import Domain
@@ -30,20 +30,20 @@ class DomainsCommand:
 
 def run(arguments: Sequence[str]) -> int:
     """List the domains."""
-    command = console.parse(DomainsCommand, arguments)
+    command = parsing.parse(DomainsCommand, arguments)
     from rich.markup import escape
 
     from nichechain import domains
 
     rows = []
     for name in domains.names():
-        with console.spinner(f"{name}: measuring its speed"):
+        with progress.spinner(f"{name}: measuring its speed"):
             rows.append(_row(name, domains.make(name), measure=command.speed))
     if command.json:
         print(json.dumps(rows, indent=2))
         return 0
     headings = ["domain", "behavior", "bounds", "genotype", *(["evaluations/s"] if command.speed else [])]
-    listed = console.table(*headings)
+    listed = output.table(*headings)
     for column in listed.columns:
         column.no_wrap = True
     for row in rows:
@@ -52,7 +52,7 @@ def run(arguments: Sequence[str]) -> int:
         if command.speed:
             cells.append(f"{row['evaluations_per_second']:,.0f}")
         listed.add_row(*map(escape, cells))
-    shown = console.console()
+    shown = output.console()
     shown.print(listed)
     shown.print("Any Gymnasium environment, with bounds of what its descriptor gives:")
     shown.print("  nichechain build gym:ENV_ID --descriptor final-xy --bounds X0,X1,Y0,Y1")

@@ -8,9 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-import tyro
-
-from nichechain.cli import console
+from nichechain.cli import output, parsing, progress
 from nichechain.core.checks import check_at_least
 from nichechain.core.errors import NichechainError
 
@@ -21,30 +19,27 @@ if TYPE_CHECKING:
     from nichechain.validation.held_out import Comparison
     from nichechain.validation.stability import RankStability
 
-FORMATS = (".png", ".svg", ".pdf")
-
 
 @dataclass(frozen=True)
 class EstimateCommand:
     """The estimate of T from births; which estimator foretells births best; whether they are enough."""
 
-    path: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="PATH")]
-    """Archive folder, or the name of an archive that ships with nichechain."""
-    compare: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
+    path: parsing.ArchivePath
+    compare: bool = False
     """Hold out the children of some elites and see which estimator foretells them best."""
-    stability: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
+    stability: bool = False
     """Thin the births and see whether fewer would have ranked the niches alike."""
-    estimator: Literal["empirical-bayes", "dirichlet", "mle"] = "empirical-bayes"
+    estimator: parsing.EstimatorName = "empirical-bayes"
     """T from births: posteriors around a pooled or a uniform base, or row-normalised counts."""
-    folds: Annotated[int | None, console.option("INT", "5")] = None
+    folds: Annotated[int | None, parsing.option("INT", "5")] = None
     """For --compare: parts of the elites, each held out in its turn."""
-    thin: Annotated[Literal["elite", "birth"] | None, console.option("{elite,birth}", "elite")] = None
+    thin: Annotated[Literal["elite", "birth"] | None, parsing.option("{elite,birth}", "elite")] = None
     """For --stability: leave out whole elites with their children, or single births."""
-    repeats: Annotated[int | None, console.option("INT", "3")] = None
+    repeats: Annotated[int | None, parsing.option("INT", "3")] = None
     """For --stability: how often to thin to each part."""
     min_births: int = 20
     """For --stability: niches with fewer births behind their row of T are not ranked."""
-    out: Annotated[Path | None, console.option("FILE", "none")] = None
+    out: Annotated[Path | None, parsing.option("FILE", "none")] = None
     """For --stability: a picture of it, .png, .svg or .pdf."""
     seed: int = 0
     """Of folds, thinning and draws."""
@@ -54,7 +49,7 @@ class EstimateCommand:
 
 def run(arguments: Sequence[str]) -> int:
     """Say what the births say of T."""
-    command = console.parse(EstimateCommand, arguments)
+    command = parsing.parse(EstimateCommand, arguments)
     _check(command)
     from nichechain.archive.archive import load
 
@@ -84,14 +79,7 @@ def _check(command: EstimateCommand) -> None:
                 raise NichechainError(f"{name} belongs to {owner}, which is not given")
     check_at_least(0, **{"--seed": command.seed, "--min-births": command.min_births})
     if command.out is not None:
-        if command.out.suffix.lower() not in FORMATS:
-            raise NichechainError(
-                f"--out is {str(command.out)!r}, but must end in one of {', '.join(FORMATS)}"
-            )
-        if not command.out.parent.is_dir():
-            raise NichechainError(
-                f"--out is {str(command.out)!r}, but there is no folder {command.out.parent}"
-            )
+        output.check_out(command.out)
 
 
 def _estimate(command: EstimateCommand, archive: Archive) -> None:
@@ -136,7 +124,7 @@ def _estimate(command: EstimateCommand, archive: Archive) -> None:
                 if effect > 1
                 else "1: every birth counts in full",
             }
-        console.console().print(console.facts(rows))
+        output.console().print(output.facts(rows))
         return
     import pandas as pd
 
@@ -146,26 +134,26 @@ def _estimate(command: EstimateCommand, archive: Archive) -> None:
 def _compare(command: EstimateCommand, archive: Archive) -> None:
     from nichechain.validation.held_out import compare_estimators
 
-    with console.spinner("holding out elites"):
+    with progress.spinner("holding out elites"):
         found = compare_estimators(
             archive.counts, folds=5 if command.folds is None else command.folds, seed=command.seed
         )
     frame = found.to_frame()
     if command.format != "table":
         about = {"folds": found.folds, "elites": found.elites, "seed": found.seed}
-        _write(frame, {**about, "estimators": _records(frame)}, command)
+        _write(frame, {**about, "estimators": output.records(frame)}, command)
         return
     _show_comparison(found)
 
 
 def _show_comparison(found: Comparison) -> None:
-    shown = console.console()
+    shown = output.console()
     shown.print(
         f"[bold]Births foretold[/]: the children of {found.elites} elites, "
         f"a {found.folds}th of the elites held out at a time"
     )
     best = found.rows[0].estimator
-    table = console.table("estimator", "impossible", "nats per birth", "against the first")
+    table = output.table("estimator", "impossible", "nats per birth", "against the first")
     for row in found.rows:
         gain = "" if row.estimator == best else f"{row.difference:+.3f} ± {row.standard_error:.3f}"
         table.add_row(row.estimator, f"{row.impossible:.1%}", f"{row.log_likelihood:.3f}", gain)
@@ -180,7 +168,7 @@ def _show_comparison(found: Comparison) -> None:
 def _stability(command: EstimateCommand, archive: Archive) -> None:
     from nichechain.validation.stability import rank_stability
 
-    with console.spinner("thinning births"):
+    with progress.spinner("thinning births"):
         found = rank_stability(
             archive.counts,
             thin=command.thin or "elite",
@@ -200,14 +188,14 @@ def _stability(command: EstimateCommand, archive: Archive) -> None:
             "halves": found.halves.tolist(),
             "enough": found.enough,
         }
-        _write(frame, {**about, "parts": _records(frame)}, command)
+        _write(frame, {**about, "parts": output.records(frame)}, command)
         return
-    shown = console.console()
+    shown = output.console()
     shown.print(
         f"[bold]Ranking of {found.niches} niches[/] by {found.l}-evolvability, thinned births against all: "
         "Spearman's correlation"
     )
-    table = console.table("part", "births", "mean", "lowest", "highest")
+    table = output.table("part", "births", "mean", "lowest", "highest")
     for row in found.to_frame().itertuples():
         values = (f"{value:.2f}" for value in (row.spearman, row.lowest, row.highest))
         table.add_row(f"{row.fraction:.0%}", f"{row.births:.0f}", *values)
@@ -218,19 +206,11 @@ def _stability(command: EstimateCommand, archive: Archive) -> None:
 
 
 def _draw(found: RankStability, out: Path) -> None:
-    # A figure made directly, not through pyplot, needs no display and leaves no state behind.
-    from matplotlib.figure import Figure
-
     from nichechain.plots.stability import plot_stability
 
-    figure = Figure(figsize=(6.4, 4.8))
+    figure = output.new_figure(6.4, 4.8)
     plot_stability(found, figure.add_subplot())
-    figure.savefig(out, dpi=200, bbox_inches="tight", pad_inches=0.15)
-
-
-def _records(frame: pd.DataFrame) -> Any:
-    # NaN is no JSON; pandas writes null.
-    return json.loads(frame.to_json(orient="records"))
+    output.save_figure(figure, out, dpi=200)
 
 
 def _write(frame: pd.DataFrame, content: dict[str, Any], command: EstimateCommand) -> None:

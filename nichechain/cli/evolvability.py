@@ -7,9 +7,7 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-import tyro
-
-from nichechain.cli import console
+from nichechain.cli import output, parsing, progress
 from nichechain.core.checks import check_at_least
 from nichechain.core.errors import NichechainError
 
@@ -26,27 +24,26 @@ _LABELS = {"posterior": "90 % interval", "prior": "prior band", "bootstrap": "90
 class EvolvabilityCommand:
     """l-evolvability of niches, or of the genotype of an elite."""
 
-    path: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="PATH")]
-    """Archive folder, or the name of an archive that ships with nichechain."""
+    path: parsing.ArchivePath
     l: int = 5
     """Generations to look ahead."""
     lineages: int = 100
     """Independent lineages U: l times U descendants."""
-    niche: Annotated[str | None, console.option("I,J", "none")] = None
+    niche: Annotated[str | None, parsing.option("I,J", "none")] = None
     """One niche, by grid index or number."""
-    elite: Annotated[str | None, console.option("I,J", "none")] = None
+    elite: Annotated[str | None, parsing.option("I,J", "none")] = None
     """The genotype of a niche's elite: its own offspring are evaluated and begin the lineages."""
-    top: Annotated[int | None, console.option("INT", "10")] = None
+    top: Annotated[int | None, parsing.option("INT", "10")] = None
     """So many of the best niches."""
     method: Literal["exact", "monte-carlo"] = "exact"
     """In closed form, or by the paper's simulation."""
     convention: Literal["definition", "procedure"] = "definition"
     """Whether the descendants alone count, or the root's own niche as well."""
-    estimator: Literal["empirical-bayes", "dirichlet", "mle"] = "empirical-bayes"
+    estimator: parsing.EstimatorName = "empirical-bayes"
     """T from births: posteriors around a pooled or a uniform base, or row-normalised counts."""
     unvisited: Annotated[
         Literal["self", "uniform", "base", "absorb"] | None,
-        console.option("{self,uniform,base,absorb}", "self"),
+        parsing.option("{self,uniform,base,absorb}", "self"),
     ] = None
     """For mle: a row without births stays, goes anywhere, goes where most children go, or leaves for good."""
     offspring: int = 30
@@ -61,11 +58,9 @@ class EvolvabilityCommand:
     """Simulations, for --method monte-carlo."""
     seed: int = 0
     """Seed of draws, simulations and offspring."""
-    workers: Annotated[str | None, console.option("WORKERS", "one thread per processor")] = None
+    workers: Annotated[str | None, parsing.option("WORKERS", "one thread per processor")] = None
     """Who evaluates an elite's offspring: a number of threads, processes:N, ray or ray://HOST:PORT."""
-    cache_memory: Annotated[str | None, console.option("SIZE", "2GiB")] = None
-    """Memory on each machine for physics that was computed before, such as 500MB, or 0 for none. The result
-    is the same."""
+    cache_memory: parsing.CacheMemory = None
     format: Literal["table", "csv", "json"] = "table"
     """How to write it."""
 
@@ -77,7 +72,7 @@ class EvolvabilityCommand:
 
 def run(arguments: Sequence[str]) -> int:
     """Score niches or an elite."""
-    command = console.parse(EvolvabilityCommand, arguments)
+    command = parsing.parse(EvolvabilityCommand, arguments)
     _check(command)
     from nichechain.archive.archive import load
     from nichechain.evolvability.question import Question
@@ -137,7 +132,7 @@ def _one(command: EvolvabilityCommand, archive: Archive, chain: NicheChain) -> p
         state = elite.state
         with (
             execution.make(command.workers, command.cache_memory) as executor,
-            console.spinner("evaluating the elite's offspring"),
+            progress.spinner("evaluating the elite's offspring"),
         ):
             result = genotype_evolvability(
                 archive,
@@ -184,7 +179,7 @@ def _set_band(frame: pd.DataFrame, command: EvolvabilityCommand, archive: Archiv
             seed=command.seed,
         )
     else:
-        with console.spinner("resampling elites"):
+        with progress.spinner("resampling elites"):
             band = bootstrap_elites(
                 archive.counts,
                 l=command.l,
@@ -203,10 +198,10 @@ def _write(frame: pd.DataFrame, command: EvolvabilityCommand) -> None:
         print(frame.to_csv(index=False), end="")
         return
     if command.format == "json":
-        print(json.dumps(json.loads(frame.to_json(orient="records")), indent=2))
+        print(json.dumps(output.records(frame), indent=2))
         return
     first = frame.iloc[0]
-    shown = console.console()
+    shown = output.console()
     shown.print(
         f"[bold]{command.l}-evolvability[/]: niches that {command.lineages} lineages of {command.l} "
         "generations reach"
@@ -219,7 +214,7 @@ def _write(frame: pd.DataFrame, command: EvolvabilityCommand) -> None:
     # A given T has no interval; a niche of one elite has a bootstrap, though without spread.
     given = command.uncertainty == "posterior" and bool((frame["low"] == frame["high"]).all())
     columns = [first.root, "niches reached", *([] if given else [_LABELS[command.uncertainty]]), "± s.e."]
-    table = console.table(*columns, "births behind the row")
+    table = output.table(*columns, "births behind the row")
     for row in frame.itertuples():
         interval = [] if given else [f"{row.low:.2f} to {row.high:.2f}"]
         table.add_row(row.index, f"{row.value:.2f}", *interval, f"{row.standard_error:.2f}", str(row.births))

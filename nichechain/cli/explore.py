@@ -5,13 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
 
-import tyro
-
-from nichechain.cli import console
+from nichechain.cli import output, parsing, progress
 from nichechain.core.checks import check_at_least
-from nichechain.core.errors import NichechainError
 
 
 @dataclass(frozen=True)
@@ -21,15 +17,14 @@ class ExploreCommand:
     The page is one HTML file that needs no network.
     """
 
-    path: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="PATH")]
-    """Archive folder, or the name of an archive that ships with nichechain."""
+    path: parsing.ArchivePath
     out: Path = Path("explore.html")
     """Page to write."""
     l: int = 5
     """Generations that it shows first, 1 to 10."""
     lineages: int = 100
     """Lineages U that it shows first."""
-    estimator: Literal["empirical-bayes", "dirichlet", "mle"] = "empirical-bayes"
+    estimator: parsing.EstimatorName = "empirical-bayes"
     """How T is estimated."""
     draws: int = 20
     """Posterior draws of T behind the intervals."""
@@ -39,17 +34,14 @@ class ExploreCommand:
 
 def run(arguments: Sequence[str]) -> int:
     """Write the page."""
-    command = console.parse(ExploreCommand, arguments)
-    if not command.out.parent.is_dir():
-        raise NichechainError(f"--out is {str(command.out)!r}, but there is no folder {command.out.parent}")
-    if command.out.is_dir():
-        raise NichechainError(f"--out is {str(command.out)!r}, but that is a folder")
+    command = parsing.parse(ExploreCommand, arguments)
+    output.check_out(command.out, ())
     check_at_least(0, **{"--seed": command.seed})
     from nichechain.archive.archive import load
     from nichechain.plots.explorer import write_explorer
 
     archive = load(command.path)
-    with console.spinner("computing intervals over posterior draws"):
+    with progress.spinner("computing intervals over posterior draws"):
         write_explorer(
             archive,
             archive.chain(command.estimator),
@@ -60,5 +52,5 @@ def run(arguments: Sequence[str]) -> int:
             seed=command.seed,
         )
     size = command.out.stat().st_size
-    console.console().print(f"wrote {command.out} ({size / 1e6:.1f} MB): open it in a browser")
+    output.console().print(f"wrote {command.out} ({size / 1e6:.1f} MB): open it in a browser")
     return 0

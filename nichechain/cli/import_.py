@@ -9,7 +9,7 @@ from typing import Annotated
 
 import tyro
 
-from nichechain.cli import console
+from nichechain.cli import output, parsing
 from nichechain.core.errors import NichechainError
 from nichechain.search.config import Outside
 
@@ -28,25 +28,25 @@ class ImportCommand:
     """Archive folder to make."""
     outside: Outside = "state"
     """Where a behavior out of bounds belongs: a state of its own, one never left, or the nearest niche."""
-    parent: Annotated[str | None, console.option("COLUMN", "parent_niche")] = None
+    parent: Annotated[str | None, parsing.option("COLUMN", "parent_niche")] = None
     """Column with the number of the parent's niche; empty for initial births."""
-    child: Annotated[str | None, console.option("COLUMN", "child_niche")] = None
+    child: Annotated[str | None, parsing.option("COLUMN", "child_niche")] = None
     """Column with the number of the child's niche; empty where the child failed."""
-    parent_behavior: Annotated[str | None, console.option("COLUMN,COLUMN", "none")] = None
+    parent_behavior: Annotated[str | None, parsing.option("COLUMN,COLUMN", "none")] = None
     """In place of --parent: columns with the parent's behavior."""
-    child_behavior: Annotated[str | None, console.option("COLUMN,COLUMN", "none")] = None
+    child_behavior: Annotated[str | None, parsing.option("COLUMN,COLUMN", "none")] = None
     """In place of --child: columns with the child's behavior."""
-    run: Annotated[str | None, console.option("COLUMN", "one run")] = None
+    run: Annotated[str | None, parsing.option("COLUMN", "one run")] = None
     """Column that tells runs apart."""
-    uid: Annotated[str | None, console.option("COLUMN", "the row's number")] = None
+    uid: Annotated[str | None, parsing.option("COLUMN", "the row's number")] = None
     """Column with the child's number."""
-    elite: Annotated[str | None, console.option("COLUMN", "none")] = None
+    elite: Annotated[str | None, parsing.option("COLUMN", "none")] = None
     """Column with the parent's number: lets children of one parent count as related."""
-    step: Annotated[str | None, console.option("COLUMN", "none")] = None
+    step: Annotated[str | None, parsing.option("COLUMN", "none")] = None
     """Column with the step of the search."""
-    lineage: Annotated[str | None, console.option("COLUMN", "none")] = None
+    lineage: Annotated[str | None, parsing.option("COLUMN", "none")] = None
     """Column that is true where the parent was not selected: it was the latest birth of a lineage."""
-    names: Annotated[str | None, console.option("NAME,NAME", "the behavior columns")] = None
+    names: Annotated[str | None, parsing.option("NAME,NAME", "the behavior columns")] = None
     """What the axes of behavior are called."""
     unit: str = "units"
     """Unit of behavior."""
@@ -54,7 +54,7 @@ class ImportCommand:
 
 def run(arguments: Sequence[str]) -> int:
     """Import."""
-    command = console.parse(ImportCommand, arguments)
+    command = parsing.parse(ImportCommand, arguments)
     for name in ("parent", "child"):
         if getattr(command, name) is not None and getattr(command, f"{name}_behavior") is not None:
             raise NichechainError(f"--{name} and --{name}-behavior exclude each other: give one of them")
@@ -63,8 +63,8 @@ def run(arguments: Sequence[str]) -> int:
     from nichechain.niches import GridNiches, parse_bounds, parse_shape
 
     columns = Columns(
-        _words(command.parent_behavior) or command.parent or "parent_niche",
-        _words(command.child_behavior) or command.child or "child_niche",
+        parsing.words(command.parent_behavior) or command.parent or "parent_niche",
+        parsing.words(command.child_behavior) or command.child or "child_niche",
         command.run,
         command.uid,
         command.elite,
@@ -74,7 +74,7 @@ def run(arguments: Sequence[str]) -> int:
     niches = GridNiches(
         parse_shape(command.grid, "--grid"), parse_bounds(command.bounds, "--bounds"), command.outside
     )
-    axes = Axes(_words(command.names), command.unit)
+    axes = Axes(parsing.words(command.names), command.unit)
     import_births(command.log, command.out, niches, columns=columns, axes=axes)
     counts = load(command.out).counts
     rows = {
@@ -84,15 +84,11 @@ def run(arguments: Sequence[str]) -> int:
         "rows of T observed": f"{counts.rows_observed} of {len(niches)}",
         "archive": str(command.out),
     }
-    shown = console.console()
-    shown.print(console.facts(rows))
+    shown = output.console()
+    shown.print(output.facts(rows))
     if command.elite is None:
         shown.print(
             "The log does not say whose children births are: all count as unrelated, and what follows "
             "may seem surer than it is."
         )
     return 0
-
-
-def _words(text: str | None) -> tuple[str, ...]:
-    return () if text is None else tuple(part.strip() for part in text.split(","))

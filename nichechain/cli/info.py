@@ -5,26 +5,23 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any, Literal
+from typing import Any, Literal
 
-import tyro
-
-from nichechain.cli import console
+from nichechain.cli import output, parsing
 
 
 @dataclass(frozen=True)
 class InfoCommand:
     """What is in an archive, with the configuration and versions that made it."""
 
-    path: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="PATH")]
-    """Archive folder, or the name of an archive that ships with nichechain."""
+    path: parsing.ArchivePath
     format: Literal["table", "json"] = "table"
     """How to write it."""
 
 
 def run(arguments: Sequence[str]) -> int:
     """Say what is in the archive."""
-    command = console.parse(InfoCommand, arguments)
+    command = parsing.parse(InfoCommand, arguments)
     import pyarrow.compute as pc
 
     from nichechain.archive import read
@@ -88,20 +85,20 @@ def run(arguments: Sequence[str]) -> int:
         "rows of T observed": str(content["rows_of_T_observed"]),
         "deepest elite": f"{content['deepest_elite']} generations",
         "genotype": f"{content['genotype_length']} parameters",
-        **console.physics(saved),
+        **output.physics(saved),
         "on disk": f"{size / 1e6:.1f} MB",
     }
-    shown = console.console()
-    shown.print(console.facts(rows))
+    shown = output.console()
+    shown.print(output.facts(rows))
     if meta.imported:
         assert meta.origin is not None
         shown.print("\n[bold]Imported from[/]")
-        shown.print(console.facts({name: _plain(value) for name, value in _origin(meta.origin).items()}))
+        shown.print(output.facts({name: _plain(value) for name, value in _origin(meta.origin).items()}))
     else:
         shown.print("\n[bold]Configuration[/]" + (" of the first run" if meta.origin else ""))
-        shown.print(console.facts({name: _plain(value) for name, value in config.to_json().items()}))
+        shown.print(output.facts({name: _plain(value) for name, value in config.to_json().items()}))
     shown.print("\n[bold]Versions[/]")
-    shown.print(console.facts(meta.versions))
+    shown.print(output.facts(meta.versions))
     return 0
 
 

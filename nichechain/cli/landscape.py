@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import tyro
-
-from nichechain.cli import console
+from nichechain.cli import output, parsing, progress
 from nichechain.core.checks import check_at_least
 from nichechain.core.errors import NichechainError
 from nichechain.search.config import BuildConfig, MutationName
@@ -31,17 +28,16 @@ _MOST_AXES = 2
 class LandscapeCommand:
     """Measure the behavior landscape around every elite of an archive, by samples of its offspring."""
 
-    path: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="PATH")]
-    """Archive folder, or the name of an archive that ships with nichechain."""
+    path: parsing.ArchivePath
     offspring: int = 30
     """Sample size: offspring of each elite. Measures of different sizes do not compare."""
-    mutation: Annotated[MutationName | None, console.option("NAME", "the archive's own")] = None
+    mutation: Annotated[MutationName | None, parsing.option("NAME", "the archive's own")] = None
     """Operator that makes them: cauchy, gaussian, student-t or uniform-ball."""
-    scale: Annotated[float | None, console.option("FLOAT", "the archive's own")] = None
+    scale: Annotated[float | None, parsing.option("FLOAT", "the archive's own")] = None
     """Scale of the mutation."""
-    step_bound: Annotated[str | None, console.option("KIND:SIZE", "the archive's own")] = None
+    step_bound: Annotated[str | None, parsing.option("KIND:SIZE", "the archive's own")] = None
     """Bound the neighbourhood: per-coordinate:SIZE (truncated), rescaled:SIZE (of a whole step), or none."""
-    elites: Annotated[int | None, console.option("INT", "all")] = None
+    elites: Annotated[int | None, parsing.option("INT", "all")] = None
     """Measure so many elites, drawn at random; a larger sample holds a smaller one."""
     share: float = 0.1
     """Quantile of r* up to which an elite is a dissimilum."""
@@ -55,30 +51,27 @@ class LandscapeCommand:
     """Rows to print; the table has them all."""
     by: str = "expected-evolvability"
     """Measure that they are sorted by."""
-    lowest: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
+    lowest: bool = False
     """Print the lowest instead of the highest."""
-    map: Annotated[str | None, console.option("NAME,NAME,...", "r, r*, LS, LS*, η and η*")] = None
+    map: Annotated[str | None, parsing.option("NAME,NAME,...", "r, r*, LS, LS*, η and η*")] = None
     """Measures to draw, such as expected-ratio,hull-volume; none draws nothing."""
     seed: int = 0
     """Seed of the offspring, of the sample of elites and of posterior draws."""
-    workers: Annotated[str | None, console.option("WORKERS", "one thread per processor")] = None
-    """Who evaluates: a number of threads, processes:N, ray or ray://HOST:PORT. The result is the same."""
-    cache_memory: Annotated[str | None, console.option("SIZE", "2GiB")] = None
-    """Memory on each machine for physics that was computed before, such as 500MB, or 0 for none. The result
-    is the same."""
-    out: Annotated[Path | None, console.option("FILE", "NAME-landscape.csv")] = None
+    workers: parsing.Workers = None
+    cache_memory: parsing.CacheMemory = None
+    out: Annotated[Path | None, parsing.option("FILE", "NAME-landscape.csv")] = None
     """Table to write, .csv or .parquet; beside it the summary (.json) and the maps (.png)."""
-    resume: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
+    resume: bool = False
     """Go on with an interrupted measurement."""
-    force: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
+    force: bool = False
     """Start an interrupted measurement over."""
-    json: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
+    json: bool = False
     """Print summary and rows as JSON."""
 
 
 def run(arguments: Sequence[str]) -> int:
     """Measure, write, and say what came of it."""
-    command = console.parse(LandscapeCommand, arguments)
+    command = parsing.parse(LandscapeCommand, arguments)
     from nichechain import execution
     from nichechain.archive.archive import load
     from nichechain.evolvability.question import Question
@@ -95,7 +88,7 @@ def run(arguments: Sequence[str]) -> int:
         find_measures(command.map.split(","))
     archive = load(command.path)
     out = command.out or Path(f"{archive.folder.name}-landscape.csv")
-    _check_out(out)
+    output.check_out(out, TABLES)
     keep = out.with_name(f"{out.name}.partial")
     if command.resume and command.force:
         raise NichechainError("--resume and --force exclude each other: go on, or start over")
@@ -111,17 +104,10 @@ def run(arguments: Sequence[str]) -> int:
     _, mutate = make_mutation(_config(command, archive), weights)
     measured = len(archive.elites) if command.elites is None else min(command.elites, len(archive.elites))
     total = measured * (1 + command.offspring)
-    done = 0
-    shown = console.console()
+    shown = output.console()
     with execution.make(command.workers, command.cache_memory) as executor:
         try:
-            with console.counting(total, "evaluations") as tell:
-
-                def count(more: int) -> None:
-                    nonlocal done
-                    done += more
-                    tell(done)
-
+            with progress.adding(total, "evaluations") as tell:
                 found = measure_archive(
                     archive,
                     command.offspring,
@@ -131,7 +117,7 @@ def run(arguments: Sequence[str]) -> int:
                     elites=command.elites,
                     share=command.share,
                     keep=keep,
-                    on_done=count,
+                    on_done=tell,
                 )
         except KeyboardInterrupt:
             # What is printed for people must not spoil what a program reads.
@@ -144,23 +130,12 @@ def run(arguments: Sequence[str]) -> int:
     keep.unlink(missing_ok=True)
     rows = _top(command, frame, by)
     if command.json:
-        records = json.loads(rows.to_json(orient="records", double_precision=15))
+        records = output.records(rows, digits=15)
         print(json.dumps({**summary, "elites": records}, indent=2))
         return 0
     _show(command, archive, found, summary, rows, by)
     shown.print(f"wrote {', '.join(written)}")
     return 0
-
-
-def _check_out(out: Path) -> None:
-    if out.suffix.lower() not in TABLES:
-        raise NichechainError(f"--out is {str(out)!r}, but must end in one of {', '.join(TABLES)}")
-    if not out.parent.is_dir():
-        raise NichechainError(f"--out is {str(out)!r}, but there is no folder {out.parent}")
-    if out.is_dir():
-        raise NichechainError(f"--out is {str(out)!r}, but that is a folder, not a file")
-    if not os.access(out.parent, os.W_OK):
-        raise NichechainError(f"--out is {str(out)!r}, but nothing can be written to {out.parent}")
 
 
 def _config(command: LandscapeCommand, archive: Archive) -> BuildConfig:
@@ -193,7 +168,7 @@ def _results(
     from nichechain.evolvability import niche_evolvability
 
     chain = archive.chain()
-    with console.spinner("l-evolvability of the niches"):
+    with progress.spinner("l-evolvability of the niches"):
         scores = niche_evolvability(chain, l=command.l, lineages=command.lineages, seed=command.seed)
     assert scores.births is not None
     compared = np.where(scores.births >= command.min_births, scores.value, np.nan)
@@ -250,24 +225,14 @@ def _write(
     about = out.with_suffix(".json")
     files = {out: table, about: (json.dumps(summary, indent=2) + "\n").encode()}
     if command.map != _NO_MAPS and len(found.behavior_names) <= _MOST_AXES:
-        files[out.with_suffix(".png")] = _draw(command, archive, found)
+        from nichechain.plots.landscape import MAPS, plot_landscape
+
+        figure = output.new_figure(6.4, 4.8)
+        plot_landscape(archive, found, figure, MAPS if command.map is None else command.map.split(","))
+        files[out.with_suffix(".png")] = output.figure_bytes(figure, ".png", dpi=110)
     for path, content in files.items():
         write_atomically(path, content)
     return [str(path) for path in files]
-
-
-def _draw(command: LandscapeCommand, archive: Archive, found: Landscape) -> bytes:
-    import io
-
-    from matplotlib.figure import Figure
-
-    from nichechain.plots.landscape import MAPS, plot_landscape
-
-    figure = Figure()
-    plot_landscape(archive, found, figure, MAPS if command.map is None else command.map.split(","))
-    buffer = io.BytesIO()
-    figure.savefig(buffer, dpi=110, bbox_inches="tight", pad_inches=0.15)
-    return buffer.getvalue()
 
 
 def _top(command: LandscapeCommand, frame: pd.DataFrame, by: Measure) -> pd.DataFrame:
@@ -288,7 +253,7 @@ def _show(
 ) -> None:
     from nichechain.landscape import MEASURES
 
-    shown = console.console()
+    shown = output.console()
     unit = f" {found.unit}" if found.unit else ""
     of_all = f" of {len(archive.elites)}" if len(found) < len(archive.elites) else ""
     made = f"{summary['mutation']} mutation of "
@@ -310,13 +275,13 @@ def _show(
         "neutral elites": str(summary["neutral"]),
         "failed offspring": f"{failed} of {len(found) * found.sample_size}",
     }
-    shown.print(console.facts(facts))
+    shown.print(output.facts(facts))
     if len(rows):
         names = [name for name in MEASURES if name not in ("ratio", "hull_volume")]
         if by.name not in names:
             names[0] = by.name
         which = "Lowest" if command.lowest else "Highest"
-        table = console.table(
+        table = output.table(
             "niche",
             *(MEASURES[name].symbol for name in names),
             f"{command.l}-ev.",
@@ -333,7 +298,7 @@ def _show(
             )
         shown.print(table)
     compared = summary["l_evolvability"]
-    table = console.table(
+    table = output.table(
         "measure", "Spearman", "p", "n", title=f"With {compared['l']}-evolvability of the niche"
     )
     for entry in compared["spearman"]:

@@ -9,7 +9,7 @@ from typing import Annotated
 
 import tyro
 
-from nichechain.cli import console
+from nichechain.cli import output, parsing
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,7 @@ class MergeCommand:
 
 def run(arguments: Sequence[str]) -> int:
     """Merge."""
-    command = console.parse(MergeCommand, arguments)
+    command = parsing.parse(MergeCommand, arguments)
     from nichechain.archive.archive import load
     from nichechain.archive.merge import merge
 
@@ -40,5 +40,5 @@ def run(arguments: Sequence[str]) -> int:
         "rows of T observed": f"{counts.rows_observed} of {niches}",
         "archive": str(command.out),
     }
-    console.console().print(console.facts(rows))
+    output.console().print(output.facts(rows))
     return 0

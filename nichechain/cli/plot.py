@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
-from nichechain.cli import console
+from nichechain.cli import output, parsing
 from nichechain.core.checks import check_at_least
 from nichechain.core.errors import NichechainError
 
@@ -18,7 +18,6 @@ if TYPE_CHECKING:
 
     from nichechain.archive.archive import Archive
 
-FORMATS = (".png", ".svg", ".pdf")
 _WITH_THRESHOLD = ("reachability", "classes", "transitions-by-class")
 
 # Figures of two pictures, and their sizes in inches.
@@ -30,8 +29,7 @@ _FEW_DRAWS = 5
 class PlotCommand:
     """Draw an archive over behavior space, or its chain."""
 
-    path: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="PATH")]
-    """Archive folder, or the name of an archive that ships with nichechain."""
+    path: parsing.ArchivePath
     kind: Annotated[
         Literal[
             "elites",
@@ -52,18 +50,18 @@ class PlotCommand:
     beside it), reach (where descendants of --niche go), classes (communicating ones, of observed
     transitions). Graphs: reachability (which niches lead to which), wormholes. Curves against l and U:
     growth. Matrices: transitions, transitions-by-class."""
-    out: Annotated[Path | None, console.option("FILE", "KIND.png")] = None
+    out: Annotated[Path | None, parsing.option("FILE", "KIND.png")] = None
     """Picture to write: .png, .svg or .pdf."""
     l: int = 5
     """Generations, for evolvability and reach."""
     lineages: int = 100
     """Lineages, for evolvability and reach."""
-    niche: Annotated[str | None, console.option("I,J", "for growth the best, the middle and the last")] = None
+    niche: Annotated[str | None, parsing.option("I,J", "for growth the best, the middle and the last")] = None
     """Niche whose descendants reach shows, or growth counts."""
-    threshold: Annotated[float | None, console.option("FLOAT", "0.05, for classes 0")] = None
+    threshold: Annotated[float | None, parsing.option("FLOAT", "0.05, for classes 0")] = None
     """Probability that a transition needs for an arrow, for reachability, or must exceed to count, for
     classes and transitions-by-class."""
-    estimator: Literal["empirical-bayes", "dirichlet", "mle"] = "empirical-bayes"
+    estimator: parsing.EstimatorName = "empirical-bayes"
     """How T is estimated; classes are always those of mle, as a posterior has no zeros."""
     min_births: int = 20
     """Niches with fewer births behind their row of T are crossed out, for evolvability."""
@@ -73,12 +71,9 @@ class PlotCommand:
 
 def run(arguments: Sequence[str]) -> int:
     """Draw."""
-    command = console.parse(PlotCommand, arguments)
+    command = parsing.parse(PlotCommand, arguments)
     out = command.out or Path(f"{command.kind}.png")
-    if out.suffix.lower() not in FORMATS:
-        raise NichechainError(f"--out is {str(out)!r}, but must end in one of {', '.join(FORMATS)}")
-    if not out.parent.is_dir():
-        raise NichechainError(f"--out is {str(out)!r}, but there is no folder {out.parent}")
+    output.check_out(out)
     if not 10 <= command.dpi <= 2000:
         raise NichechainError(f"--dpi is {command.dpi}, but must be between 10 and 2000")
     check_at_least(0, **{"--min-births": command.min_births})
@@ -91,11 +86,8 @@ def run(arguments: Sequence[str]) -> int:
     if command.niche is not None and command.kind not in ("reach", "growth"):
         raise NichechainError(f"--niche belongs to reach and growth, not to {command.kind}")
     archive = load(command.path)
-    # A figure made directly, not through pyplot, needs no display and leaves no state behind.
-    from matplotlib.figure import Figure
-
     pair = command.kind in _PAIRS
-    figure = Figure(figsize=_PAIRS[command.kind] if pair else (7.0, 7.4))
+    figure = output.new_figure(*(_PAIRS[command.kind] if pair else (7.0, 7.4)))
     if pair:
         left, right = figure.subplots(
             1, 2, gridspec_kw={"wspace": 0.45 if command.kind == "uncertainty" else 0.2}
@@ -103,8 +95,8 @@ def run(arguments: Sequence[str]) -> int:
         _draw_pair(command, archive, left, right)
     else:
         _draw(command, archive, figure.add_subplot())
-    figure.savefig(out, dpi=command.dpi, bbox_inches="tight", pad_inches=0.15)
-    console.console().print(f"wrote {out}")
+    output.save_figure(figure, out, command.dpi)
+    output.console().print(f"wrote {out}")
     return 0
 
 

@@ -8,27 +8,22 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import tyro
-
-from nichechain.cli import console
+from nichechain.cli import output, parsing
 from nichechain.core.checks import check_at_least
 from nichechain.core.errors import NichechainError
 
 if TYPE_CHECKING:
     import nichechain.validation.grid_size
 
-FORMATS = (".png", ".svg", ".pdf")
-
 
 @dataclass(frozen=True)
 class SweepCommand:
     """Bin an archive's births into grids of other sizes: too few niches, too many, and a suggestion."""
 
-    path: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="PATH")]
-    """Archive folder, or the name of an archive that ships with nichechain."""
-    sizes: Annotated[str | None, console.option("N,N,...", "ten, from 4 to 3,200 niches")] = None
+    path: parsing.ArchivePath
+    sizes: Annotated[str | None, parsing.option("N,N,...", "ten, from 4 to 3,200 niches")] = None
     """Cells along every axis, such as 5,10,20, or along each one, such as 10x20,20x40."""
-    behavior: Annotated[str | None, console.option("X,Y", "that of the parent with the most children")] = None
+    behavior: Annotated[str | None, parsing.option("X,Y", "that of the parent with the most children")] = None
     """Behavior whose niche is scored on every grid."""
     l: int = 5
     """Generations, for the score."""
@@ -40,15 +35,15 @@ class SweepCommand:
     """Posterior draws of T behind the score."""
     seed: int = 0
     """Of draws, and of the elites that are held out."""
-    out: Annotated[Path | None, console.option("FILE", "none")] = None
+    out: Annotated[Path | None, parsing.option("FILE", "none")] = None
     """A picture of it, .png, .svg or .pdf."""
-    json: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
+    json: bool = False
     """Write JSON."""
 
 
 def run(arguments: Sequence[str]) -> int:
     """Sweep, and say what was found."""
-    command = console.parse(SweepCommand, arguments)
+    command = parsing.parse(SweepCommand, arguments)
     _check(command)
     from nichechain.archive.archive import load
     from nichechain.validation.grid_size import sweep
@@ -69,8 +64,8 @@ def run(arguments: Sequence[str]) -> int:
         suggested = None if found.suggestion is None else list(found.suggestion.shape)
         print(json.dumps({**asdict(found), "suggestion": suggested, "advice": found.advice}, indent=2))
         return 0
-    shown = console.console()
-    table = console.table("grid", "niches", "visited", "rows", "births", "known", "stay", "told", "reached")
+    shown = output.console()
+    table = output.table("grid", "niches", "visited", "rows", "births", "known", "stay", "told", "reached")
     for grid in found.grids:
         table.add_row(
             "x".join(map(str, grid.shape)),
@@ -94,7 +89,7 @@ def run(arguments: Sequence[str]) -> int:
         "told": "bits that the parent's niche tells of a child's, on elites held out",
         "reached": f"niches reached from {place} ({found.l} generations, {found.lineages} lineages)",
     }
-    shown.print(console.facts(explained))
+    shown.print(output.facts(explained))
     shown.print(f"\n[bold]Suggestion[/]  {found.advice}")
     if found.built is not None:
         shown.print(
@@ -140,24 +135,15 @@ def _check(command: SweepCommand) -> None:
     check_at_least(1, **{"--min-births": command.min_births, "--draws": command.draws})
     check_at_least(0, **{"--seed": command.seed})
     if command.out is not None:
-        if command.out.suffix.lower() not in FORMATS:
-            raise NichechainError(
-                f"--out is {str(command.out)!r}, but must end in one of {', '.join(FORMATS)}"
-            )
-        if not command.out.parent.is_dir():
-            raise NichechainError(
-                f"--out is {str(command.out)!r}, but there is no folder {command.out.parent}"
-            )
+        output.check_out(command.out)
 
 
 def _draw(found: nichechain.validation.grid_size.Sweep, out: Path) -> None:
-    from matplotlib.figure import Figure
-
     from nichechain.plots.sweep import plot_filling, plot_scores, plot_surprise
 
-    figure = Figure(figsize=(15.0, 5.0))
+    figure = output.new_figure(15.0, 5.0)
     left, middle, right = figure.subplots(1, 3, gridspec_kw={"wspace": 0.28})
     plot_filling(found, left)
     plot_surprise(found, middle)
     plot_scores(found, right)
-    figure.savefig(out, dpi=150, bbox_inches="tight", pad_inches=0.15)
+    output.save_figure(figure, out)

@@ -3,32 +3,23 @@
 from __future__ import annotations
 
 import json
-import sys
-import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import tyro
-
-from nichechain.cli import console
+from nichechain.cli import output, parsing, progress
 from nichechain.core.errors import NichechainError
 
 if TYPE_CHECKING:
     from nichechain.validation import Validation, ValidationConfig
-
-# Seconds between progress lines where there is no terminal to redraw.
-_LINE_EVERY = 10.0
 
 
 @dataclass(frozen=True)
 class ValidateCommand:
     """Test whether births are a Markov chain's, and check its predictions on lineages really run."""
 
-    path: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="PATH")]
-    """Archive folder, or the name of an archive that ships with nichechain."""
+    path: parsing.ArchivePath
     elites: int = 24
     """Elites to run lineages from, spread over what the chain predicts."""
     lineages: int = 20
@@ -39,18 +30,15 @@ class ValidateCommand:
     """Permutations of each test."""
     seed: int = 0
     """Seed of the choice of elites, of their lineages, of permutations and of draws."""
-    workers: Annotated[str | None, console.option("WORKERS", "one thread per processor")] = None
-    """Who evaluates: a number of threads, processes:N, ray or ray://HOST:PORT. The result is the same."""
-    cache_memory: Annotated[str | None, console.option("SIZE", "2GiB")] = None
-    """Memory on each machine for physics that was computed before, such as 500MB, or 0 for none. The result
-    is the same."""
-    out: Annotated[Path | None, console.option("DIR", "NAME-validation")] = None
+    workers: parsing.Workers = None
+    cache_memory: parsing.CacheMemory = None
+    out: Annotated[Path | None, parsing.option("DIR", "NAME-validation")] = None
     """Folder for validation.json, calibration.png and lineages.csv."""
 
 
 def run(arguments: Sequence[str]) -> int:
     """Validate."""
-    command = console.parse(ValidateCommand, arguments)
+    command = parsing.parse(ValidateCommand, arguments)
     from nichechain import execution
     from nichechain.archive.archive import load
     from nichechain.validation import ValidationConfig, validate
@@ -68,7 +56,7 @@ def run(arguments: Sequence[str]) -> int:
         raise NichechainError(f"--out is {str(out)!r}, but that is a file, not a folder")
     with (
         execution.make(command.workers, command.cache_memory) as executor,
-        _progress(config.evaluations) as tell,
+        progress.adding(config.evaluations, "evaluations") as tell,
     ):
         result = validate(archive, executor, config, on_done=tell)
     # Made only now, so that bad input leaves nothing behind.
@@ -77,29 +65,27 @@ def run(arguments: Sequence[str]) -> int:
     result.direct.lineages.to_frame().to_csv(out / "lineages.csv", index=False)
     _draw(result, out / "calibration.png")
     _show(result, config)
-    console.console().print(f"wrote validation.json, calibration.png and lineages.csv to {out}")
+    output.console().print(f"wrote validation.json, calibration.png and lineages.csv to {out}")
     return 0
 
 
 def _draw(result: Validation, out: Path) -> None:
     """Calibration after one generation and after all, and the means over generations."""
-    from matplotlib.figure import Figure
-
     from nichechain.plots.calibration import plot_calibration, plot_reached
 
     generations = sorted({1, result.config.l})
-    figure = Figure(figsize=(5.0 * (len(generations) + 1), 5.0), layout="constrained")
+    figure = output.new_figure(5.0 * (len(generations) + 1), 5.0, layout="constrained")
     *some, last = figure.subplots(1, len(generations) + 1)
     for generation, ax in zip(generations, some, strict=True):
         plot_calibration(result.direct, ax, generation=generation)
     plot_reached(result.direct, last)
-    figure.savefig(out, dpi=150)
+    output.save_figure(figure, out)
 
 
 def _show(result: Validation, config: ValidationConfig) -> None:
-    shown = console.console()
+    shown = output.console()
     shown.print(f"[bold]Is it Markov?[/] {result.births} births, {config.permutations} permutations")
-    table = console.table("test", "of a chain's", "p", "niches", "births")
+    table = output.table("test", "of a chain's", "p", "niches", "births")
     for test in result.tests:
         table.add_row(
             test.name,
@@ -122,7 +108,7 @@ def _show(result: Validation, config: ValidationConfig) -> None:
     if direct.lineages.failed:
         shown.print(f"{direct.lineages.failed} lineages ended with a failed evaluation")
     for start, rows in direct.summary().groupby("start", sort=False):
-        table = console.table(
+        table = output.table(
             "l",
             "real",
             "chain",
@@ -151,38 +137,3 @@ def _show(result: Validation, config: ValidationConfig) -> None:
         "the chain's, above 1 where elites differ more than it says; in 90 %: elites within the\n"
         "chain's 90 % interval[/]"
     )
-
-
-@contextmanager
-def _progress(total: int) -> Iterator[Callable[[int], None]]:
-    """A bar on standard error; plain lines now and then where that is no terminal."""
-    from rich import progress
-    from rich.console import Console
-
-    shown = Console(stderr=True)
-    if not shown.is_terminal:
-        yield _lines(total)
-        return
-    columns = (
-        progress.BarColumn(bar_width=None),
-        progress.MofNCompleteColumn(),
-        progress.TimeRemainingColumn(compact=True),
-        progress.TextColumn("left"),
-    )
-    with progress.Progress(*columns, console=shown) as bar:
-        task = bar.add_task("", total=total)
-        yield lambda done: bar.update(task, advance=done)
-
-
-def _lines(total: int) -> Callable[[int], None]:
-    evaluated = 0
-    last = time.monotonic()
-
-    def tell(done: int) -> None:
-        nonlocal evaluated, last
-        evaluated += done
-        if time.monotonic() - last >= _LINE_EVERY:
-            last = time.monotonic()
-            print(f"{evaluated} of {total} evaluated", file=sys.stderr, flush=True)
-
-    return tell

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from nichechain.cli import console
+from nichechain.cli import output, parsing, progress
 from nichechain.core.errors import NichechainError
 
 if TYPE_CHECKING:
@@ -35,26 +35,22 @@ class VerifyCommand:
     is damaged.
     """
 
-    path: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="PATH")]
-    """Archive folder, or the name of an archive that ships with nichechain."""
+    path: parsing.ArchivePath
     sample: Annotated[str, tyro.conf.arg(metavar="N|all")] = "100"
     """Elites, and as many births, to evaluate again. The rest is checked without evaluations, in full."""
     seed: int = 0
     """Seed of the choice of these."""
-    workers: Annotated[str | None, console.option("WORKERS", "one thread per processor")] = None
-    """Who evaluates: a number of threads, processes:N, ray or ray://HOST:PORT. The result is the same."""
-    cache_memory: Annotated[str | None, console.option("SIZE", "2GiB")] = None
-    """Memory on each machine for physics that was computed before, such as 500MB, or 0 for none. The result
-    is the same."""
-    strict: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
+    workers: parsing.Workers = None
+    cache_memory: parsing.CacheMemory = None
+    strict: bool = False
     """Exit with status 1 whatever the cause of a difference."""
-    json: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
+    json: bool = False
     """Write every check as JSON."""
 
 
 def run(arguments: Sequence[str]) -> int:
     """Verify."""
-    command = console.parse(VerifyCommand, arguments)
+    command = parsing.parse(VerifyCommand, arguments)
     from nichechain import execution
     from nichechain.archive.archive import load
     from nichechain.verification import verify
@@ -62,7 +58,7 @@ def run(arguments: Sequence[str]) -> int:
     sample = _sample(command.sample)
     archive = load(command.path)
     began = time.monotonic()
-    with execution.make(command.workers, command.cache_memory) as executor, console.stages() as tell:
+    with execution.make(command.workers, command.cache_memory) as executor, progress.stages() as tell:
         result = verify(
             archive,
             sample=sample,
@@ -86,8 +82,8 @@ def _sample(text: str) -> int | None:
 
 
 def _show(result: Verification, seconds: float) -> None:
-    shown = console.console()
-    table = console.table("", "checks", "compared", "differ")
+    shown = output.console()
+    table = output.table("", "checks", "compared", "differ")
     for group, text in _GROUPS.items():
         checks = [check for check in result.checks if check.group == group]
         if checks:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Literal, TypeAlias
 
 import tyro
 
-from nichechain.cli import console
+from nichechain.cli import output, parsing, progress
 from nichechain.core.errors import NichechainError
 
 if TYPE_CHECKING:
@@ -61,7 +61,7 @@ class _Walks:
     """Mutation operator: cauchy, gaussian, student-t or uniform-ball."""
     scale: float = 1.0
     """Scale of the mutation."""
-    step_bound: Annotated[str | None, console.option("KIND:SIZE", "unbounded")] = None
+    step_bound: Annotated[str | None, parsing.option("KIND:SIZE", "unbounded")] = None
     """How far a child can be from its parent: per-coordinate:2 truncates the noise on every weight,
     rescaled:50 shortens a step that is longer."""
     k: int = 15
@@ -76,27 +76,24 @@ class _Walks:
     """Behaviors that a novelty archive holds at most."""
     archive_scope: Literal["walk", "configuration"] = "walk"
     """Whether each walk has a novelty archive of its own, or all of a kind share one."""
-    other_niche: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
+    other_niche: bool = False
     """Only a child in another niche than its parent may follow."""
     initialisation: str = "domain"
     """First genotypes: domain, domain:S, normal:S, uniform:S, xavier-normal, ..., or elites:PATH."""
     grid: Annotated[str, tyro.conf.arg(metavar="NXxNY")] = "20x20"
     """Cells of the grid that coverage is measured on."""
-    bounds: Annotated[str | None, console.option("X0,X1,Y0,Y1", "the domain's")] = None
+    bounds: Annotated[str | None, parsing.option("X0,X1,Y0,Y1", "the domain's")] = None
     """Its bounds, in units of behavior."""
-    paired: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
+    paired: bool = False
     """Run r of every kind starts from the same genotype; the test is then Friedman's."""
     seed: int = 0
     """Seed of the study."""
     domain_seed: int = 0
     """Seed of what the domain holds fixed (fetch: where block and target begin)."""
-    options: Annotated[tuple[str, ...], console.option("NAME=VALUE ...", "none")] = ()
+    options: Annotated[tuple[str, ...], parsing.option("NAME=VALUE ...", "none")] = ()
     """Options of the domain, such as joints=20 of the arm, or descriptor=final-xy of a gym:ENV_ID."""
-    workers: Annotated[str | None, console.option("WORKERS", "one thread per processor")] = None
-    """Who evaluates: a number of threads, processes:N, ray or ray://HOST:PORT. The result is the same."""
-    cache_memory: Annotated[str | None, console.option("SIZE", "2GiB")] = None
-    """Memory on each machine for physics that was computed before, such as 500MB, or 0 for none. The result
-    is the same."""
+    workers: parsing.Workers = None
+    cache_memory: parsing.CacheMemory = None
 
     def base(self) -> Condition:
         """What all conditions share."""
@@ -121,7 +118,7 @@ class PressureCommand(_Walks):
         """One for each level."""
         from nichechain.studies.study import pressure_conditions
 
-        return pressure_conditions(_words(self.levels), self.base())
+        return pressure_conditions(parsing.words(self.levels), self.base())
 
 
 @dataclass(frozen=True)
@@ -139,7 +136,7 @@ class MetricsCommand(_Walks):
         """One for each metric."""
         from nichechain.studies.study import metric_conditions
 
-        return metric_conditions(_words(self.metrics), self.base())
+        return metric_conditions(parsing.words(self.metrics), self.base())
 
 
 @dataclass(frozen=True)
@@ -168,13 +165,10 @@ class ResumeCommand:
 
     path: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="PATH")]
     """Folder of the study."""
-    runs: Annotated[int | None, console.option("INT", "as many as were asked for")] = None
+    runs: Annotated[int | None, parsing.option("INT", "as many as were asked for")] = None
     """Walks of each kind."""
-    workers: Annotated[str | None, console.option("WORKERS", "one thread per processor")] = None
-    """Who evaluates: a number of threads, processes:N, ray or ray://HOST:PORT. The result is the same."""
-    cache_memory: Annotated[str | None, console.option("SIZE", "2GiB")] = None
-    """Memory on each machine for physics that was computed before, such as 500MB, or 0 for none. The result
-    is the same."""
+    workers: parsing.Workers = None
+    cache_memory: parsing.CacheMemory = None
 
 
 @dataclass(frozen=True)
@@ -192,15 +186,15 @@ def run(arguments: Sequence[str]) -> int:
         return 0
     verb, rest = arguments[0], arguments[1:]
     if verb == "report":
-        return _report(console.parse(ReportCommand, rest, name="walks report").path)
+        return _report(parsing.parse(ReportCommand, rest, name="walks report").path)
     if verb == "resume":
-        return _resume(console.parse(ResumeCommand, rest, name="walks resume"))
+        return _resume(parsing.parse(ResumeCommand, rest, name="walks resume"))
     if verb == "pressure":
-        return _begin(console.parse(PressureCommand, rest, name="walks pressure"), "pressure")
+        return _begin(parsing.parse(PressureCommand, rest, name="walks pressure"), "pressure")
     if verb == "metrics":
-        return _begin(console.parse(MetricsCommand, rest, name="walks metrics"), "metrics")
+        return _begin(parsing.parse(MetricsCommand, rest, name="walks metrics"), "metrics")
     if verb == "sensitivity":
-        return _begin(console.parse(SensitivityCommand, rest, name="walks sensitivity"), "sensitivity")
+        return _begin(parsing.parse(SensitivityCommand, rest, name="walks sensitivity"), "sensitivity")
     raise NichechainError(
         f"there is no study {verb!r}: it must be one of pressure, metrics, sensitivity, resume or report"
     )
@@ -208,9 +202,8 @@ def run(arguments: Sequence[str]) -> int:
 
 def _begin(command: PressureCommand | MetricsCommand | SensitivityCommand, kind: Kind) -> int:
     from nichechain import domains
-    from nichechain.cli.build import domain_option
 
-    options = dict(domain_option(text) for text in command.options)
+    options = parsing.domain_options(command.options)
     domain = domains.make(command.domain, seed=command.domain_seed, **options)
     return _walk(_study(command, kind, domain, options), domain, command.out, command)
 
@@ -233,13 +226,13 @@ def _walk(study: Study, domain: Domain, folder: Path, command: _Walks | ResumeCo
     from nichechain.studies.running import run as walk_study
 
     with execution.make(command.workers, command.cache_memory) as executor:
-        with console.spinner("loading the domain"):
+        with progress.spinner("loading the domain"):
             domain.evaluate(domain.sample(1, seed=0))
         try:
-            with console.counting(study.evaluations, "evaluations") as tell:
+            with progress.counting(study.evaluations, "evaluations") as tell:
                 walk_study(study, folder, executor, domain=domain, on_progress=tell)
         except KeyboardInterrupt:
-            console.console().print(
+            output.console().print(
                 f"Stopped; every finished step is kept. To go on:\n  nichechain walks resume {folder}"
             )
             return 130
@@ -254,14 +247,14 @@ def _report(folder: Path) -> int:
 
     study, unit = read_study(folder), read_unit(folder)
     records = read_records(folder, study)
-    with console.spinner("testing and drawing"):
+    with progress.spinner("testing and drawing"):
         analysis = write_report(folder, study, records, command=command_of(study, folder), unit=unit)
-    found = console.table("claim", "paper", "here", "verdict")
+    found = output.table("claim", "paper", "here", "verdict")
     for column in found.columns[1:]:
         column.justify = "left"
     for finding in find(analysis):
         found.add_row(finding.claim, finding.paper, finding.ours, finding.verdict)
-    shown = console.console()
+    shown = output.console()
     shown.print(found if found.row_count else _means(analysis, unit))
     finished = [analysis.finished.get(condition.label, 0) for condition in study.conditions]
     least, most = min(finished), max(finished)
@@ -274,7 +267,7 @@ def _report(folder: Path) -> int:
 
 def _means(analysis: Analysis, unit: str) -> Table:
     """What a study ends with on which the paper has no numbers."""
-    made = console.table("condition", "runs", f"mean η* at step {analysis.last} ({unit})", "95 % interval")
+    made = output.table("condition", "runs", f"mean η* at step {analysis.last} ({unit})", "95 % interval")
     for summary in analysis.summaries:
         if summary.measure == "expected_evolvability" and summary.step == analysis.last:
             interval = f"{summary.low:.3g} to {summary.high:.3g}"
@@ -288,7 +281,6 @@ def _means(analysis: Analysis, unit: str) -> Table:
 
 def command_of(study: Study, folder: Path) -> str:
     """The command line that asks for a study."""
-    from nichechain.cli.build import domain_option_text
     from nichechain.studies.conditions import Condition
     from nichechain.studies.study import LEVELS, METRICS, VARIATIONS
 
@@ -320,13 +312,8 @@ def command_of(study: Study, folder: Path) -> str:
     words = [f"--{name.replace('_', '-')} {shlex.quote(value)}" for name, value in options.items()]
     words += [f"--{name.replace('_', '-')}" for name in flags]
     if study.domain_options:
-        given = (f"{name}={domain_option_text(value)}" for name, value in study.domain_options.items())
-        words += ["--options", *map(shlex.quote, given)]
+        words += ["--options", *map(shlex.quote, parsing.domain_option_texts(study.domain_options))]
     return " ".join(["nichechain walks", study.kind, study.domain, *words, "--out", shlex.quote(str(folder))])
-
-
-def _words(text: str) -> list[str]:
-    return [word.strip() for word in text.split(",") if word.strip()]
 
 
 def _study(

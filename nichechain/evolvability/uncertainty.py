@@ -13,6 +13,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from nichechain.births.families import elites_of, redrawn
 from nichechain.chain.base_measure import BaseMeasure
 from nichechain.chain.counts import TransitionCounts
 from nichechain.chain.empirical_bayes import design_effect, most_likely
@@ -182,39 +183,17 @@ def bootstrap_elites(
         return answer_for_niches(_chain(of, strength, weights, effect), question).value
 
     value = values(counts, replace(question, draws=DRAWS))
-    elites = _Elites(counts)
+    families = families_of(counts)
+    elite = elites_of(families)
     again = np.array(
         [
-            values(elites.resampled(keyed(seed, Purpose.RESAMPLING, number)), question)
-            for number in range(resamples)
+            values(counts_of_families(redrawn(families, elite, rng), counts), question)
+            for rng in (keyed(seed, Purpose.RESAMPLING, number) for number in range(resamples))
         ]
     )
     low, high = value + np.quantile(again, _INTERVAL, axis=0) - np.median(again, axis=0)
     niches = len(counts.niches)
     return NicheBand("bootstrap over elites", value, np.maximum(low, 0.0), np.minimum(high, niches))
-
-
-class _Elites:
-    """Births by the elites whose children they are, elites by their niche."""
-
-    def __init__(self, counts: TransitionCounts) -> None:
-        self._counts = counts
-        self.families_of = families_of(counts)
-        owners, number = np.unique(self.families_of[:, :2], axis=0, return_inverse=True)
-        self._elite: Ints = number.ravel().astype(np.int64)
-        # Elites come sorted by state, so those of one state have numbers in a row.
-        _, first, where, size = np.unique(
-            owners[:, 0], return_index=True, return_inverse=True, return_counts=True
-        )
-        self._first = first[where.ravel()]
-        self._size = size[where.ravel()]
-
-    def resampled(self, rng: np.random.Generator) -> TransitionCounts:
-        """Counts with as many elites in every niche, drawn from its own with replacement."""
-        drawn = self._first + rng.integers(self._size)
-        families = self.families_of.copy()
-        families[:, 3] *= np.bincount(drawn, minlength=drawn.size)[self._elite]
-        return counts_of_families(families, self._counts)
 
 
 def _chain(counts: TransitionCounts, strength: float, weights: Floats, effect: Floats) -> NicheChain:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Mapping
-from dataclasses import MISSING, asdict, dataclass, field, fields
+from dataclasses import KW_ONLY, MISSING, asdict, dataclass, field, fields
 from typing import Any, Literal, get_args
 
 from nichechain.core.checks import (
@@ -30,81 +30,62 @@ MOST_FAILED = 0.5
 
 
 @dataclass(frozen=True)
-class BuildConfig:
-    """A MAP-Elites build ("Variation operator"; step 3 of the estimation of l-evolvability).
+class SearchConfig:
+    """What a MAP-Elites search does, whatever its niches are: options of ``nichechain build`` as they stand.
 
     Parameters
     ----------
     domain : str
         Name of the domain.
-    domain_seed : int
-        Seed of what the domain holds fixed, such as the block's place.
     evaluations : int
         Births in total, the initial ones among them.
-    shape : tuple of int
-        Cells of the grid along each axis of behavior; of a tessellation, its one number of niches.
-    bounds : tuple of (float, float)
-        Bounds of the niches along each axis, in units of behavior.
-    outside : {"state", "absorb", "clip"}
-        What a behavior out of bounds belongs to, see :class:`nichechain.niches.GridNiches`.
+    niches_seed : int
+        Seed of a tessellation; runs that are to be merged share it.
     initial : int
         Births without a parent.
     batch : int
         Children of a step; their parents are drawn from the elites before it.
     mutation : {"cauchy", "gaussian", "student-t", "uniform-ball"}
-        Mutation operator.
+        Mutation operator, on every weight.
     scale : float
-        Its scale.
-    replacement : {"random", "first", "newest", "objective"}
-        Which of the births of a niche is its elite: each alike, the first, the last, or the one
-        with the largest objective.
-    seed : int
-        Seed of the run.
-    niches : {"grid", "cvt"}
-        Equal cells, or a Voronoi tessellation, see :class:`nichechain.niches.CVTNiches`.
-    niches_seed : int
-        Seed of a tessellation, apart from that of the run, so that runs can share their niches.
-    domain_options : mapping of str to str, int, float or bool
-        What else :func:`nichechain.domains.make` is told of the domain.
+        Scale of the mutation.
     df : float, optional
         Degrees of freedom of student-t, by default 3.
     step_bound : ({"per-coordinate", "rescaled"}, float), optional
-        Makes N(θ) a bounded set, see :class:`nichechain.variation.Bound`.
+        How far a child can be from its parent, which makes N(θ) a bounded set: per-coordinate
+        truncates the noise on every weight, rescaled shortens a step that is longer.
     layer_scales : tuple of float
-        Factor on the scale in each layer of the controller; by default all weights are alike.
+        Factor on the scale in each layer of the controller, such as 1, 0.5, 0.5; by default all
+        weights are alike.
     self_adaptive : bool
-        Whether step sizes are genes, which mutate too and are used before the weights: one per
-        layer that has a layer scale, or else one for all weights. They begin at the scale.
+        Step sizes are genes, which mutate too and are used before the weights: one per layer that
+        has a layer scale, or else one for all weights. They begin at the scale.
     selection : {"uniform", "curiosity"}
-        How parents are drawn from the elites: each alike, or in proportion to the curiosity score,
-        see :mod:`nichechain.search.parents`.
+        How parents are drawn from the elites: each alike, or by curiosity, whose children enter.
     lineage_share : float
-        Share of the births that unselected lineages get, from 0 to below 1, see
-        :mod:`nichechain.search.lineages`. With 0 all parents are selected, which is the letter of the paper.
+        Share of the births that unselected lineages get, whose parents are their own latest births:
+        they show what lineages do. With 0 all parents are selected.
     lineage_length : int
-        Births of such a lineage, at least 2.
-
-    Raises
-    ------
-    NichechainError
-        If a value is out of range.
+        Births of such a lineage, at least 2: the first is the child of an elite.
+    replacement : {"random", "first", "newest", "objective"}
+        Which birth of a niche is its elite: each alike, the first, the last, or the best.
+    outside : {"state", "absorb", "clip"}
+        Where a behavior out of bounds belongs: a state of its own, one never left, or the nearest
+        niche.
+    seed : int
+        Seed of the run.
+    domain_seed : int
+        Seed of what the domain holds fixed (fetch: where block and target begin).
     """
 
     domain: str
-    shape: tuple[int, ...]
-    bounds: tuple[tuple[float, float], ...]
-    domain_seed: int = 0
+    _: KW_ONLY
     evaluations: int = 8000
-    outside: Outside = "state"
+    niches_seed: int = 0
     initial: int = 100
     batch: int = 64
     mutation: MutationName = "cauchy"
     scale: float = 1.0
-    replacement: Replacement = "random"
-    seed: int = 0
-    niches: NichesKind = "grid"
-    niches_seed: int = 0
-    domain_options: Mapping[str, DomainOption] = field(default_factory=dict, hash=False)
     df: float | None = None
     step_bound: tuple[StepBound, float] | None = None
     layer_scales: tuple[float, ...] = ()
@@ -112,6 +93,44 @@ class BuildConfig:
     selection: Selection = "uniform"
     lineage_share: float = 0.05
     lineage_length: int = 10
+    replacement: Replacement = "random"
+    outside: Outside = "state"
+    seed: int = 0
+    domain_seed: int = 0
+
+    def settings(self) -> dict[str, Any]:
+        """These values by their names, without what a subclass adds."""
+        return {field.name: getattr(self, field.name) for field in fields(SearchConfig)}
+
+
+@dataclass(frozen=True)
+class BuildConfig(SearchConfig):
+    """A MAP-Elites build ("Variation operator"; step 3 of the estimation of l-evolvability).
+
+    Parameters
+    ----------
+    domain, evaluations, ...
+        As in :class:`SearchConfig`; all but ``domain`` by name.
+    shape : tuple of int
+        Cells of the grid along each axis of behavior; of a tessellation, its one number of niches.
+    bounds : tuple of (float, float)
+        Bounds of the niches along each axis, in units of behavior.
+    niches : {"grid", "cvt"}
+        Equal cells, or a Voronoi tessellation, see :class:`nichechain.niches.CVTNiches`.
+    domain_options : mapping of str to str, int, float or bool
+        What else :func:`nichechain.domains.make` is told of the domain.
+
+    Raises
+    ------
+    NichechainError
+        If a value is out of range.
+    """
+
+    shape: tuple[int, ...]
+    bounds: tuple[tuple[float, float], ...]
+    _: KW_ONLY
+    niches: NichesKind = "grid"
+    domain_options: Mapping[str, DomainOption] = field(default_factory=dict, hash=False)
 
     def __post_init__(self) -> None:
         whole = ("evaluations", "initial", "batch", "seed", "domain_seed", "niches_seed", "lineage_length")
@@ -150,7 +169,6 @@ class BuildConfig:
             raise NichechainError(
                 f"lineage_share is {self.lineage_share:g}, but must be a share of births, from 0 to below 1"
             )
-        # The first birth of a lineage is the child of an elite.
         check_at_least(2, lineage_length=self.lineage_length)
         check_choice("replacement", self.replacement, get_args(Replacement))
         check_choice("niches", self.niches, get_args(NichesKind))

@@ -16,6 +16,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from nichechain.births.families import elites_of, folds_of
 from nichechain.births.joins import parent_rows
 from nichechain.births.table import NONE
 from nichechain.chain import NicheChain, TransitionCounts, estimate
@@ -352,11 +353,10 @@ def _entropy(counts: TransitionCounts) -> float:
 def _information(counts: TransitionCounts, folds: int, seed: int) -> float:
     """Mean of log2 T_ij over the share of all children in j, on held-out elites."""
     families = families_of(counts)
-    _, number = np.unique(families[:, :2], axis=0, return_inverse=True)
-    elites = int(number.max(initial=-1)) + 1
-    if elites < folds:
+    elite = elites_of(families)
+    if elite.max(initial=-1) + 1 < folds:
         return math.nan
-    fold = keyed(seed, Purpose.FOLDS).permutation(np.arange(elites) % folds)[number.ravel()]
+    fold = folds_of(elite, folds, keyed(seed, Purpose.FOLDS))
     gain = 0.0
     for turn in range(folds):
         out = fold == turn

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 from scipy.special import gammaln, softmax
 
+from nichechain.births.families import elites_of, folds_of
 from nichechain.chain.base_measure import BaseMeasure
 from nichechain.chain.counts import TransitionCounts
 from nichechain.chain.estimators import Unvisited, estimate
@@ -113,12 +114,11 @@ def compare_estimators(counts: TransitionCounts, *, folds: int = 5, seed: int = 
     """
     check_at_least(2, folds=folds)
     families = families_of(counts)
-    _, elite = np.unique(families[:, :2], axis=0, return_inverse=True)
-    elite = elite.ravel()
+    elite = elites_of(families)
     elites = int(elite.max(initial=-1)) + 1
     if elites < folds:
         raise NichechainError(f"folds is {folds}, but only {elites} elites have children")
-    fold = keyed(seed, Purpose.FOLDS).permutation(np.arange(elites) % folds)[elite]
+    fold = folds_of(elite, folds, keyed(seed, Purpose.FOLDS))
     parent, child, weight = families[:, 0], families[:, 2], families[:, 3]
     fits = dict(_fits(counts))
     foretold = {name: np.zeros(len(families)) for name in fits}

@@ -11,8 +11,10 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy.stats import spearmanr
 
+from nichechain.births.families import elites_of, tabulated
 from nichechain.chain.counts import TransitionCounts
 from nichechain.chain.estimators import Estimator, estimate
+from nichechain.chain.families import orphans_of
 from nichechain.core.checks import as_floats, check_at_least, check_choice
 from nichechain.core.errors import NichechainError
 from nichechain.core.randomness import Purpose, keyed
@@ -211,18 +213,12 @@ class _Thinner:
 
     def __init__(self, counts: TransitionCounts, thin: str, rng: np.random.Generator) -> None:
         self._counts = counts
-        known = TransitionCounts.from_pairs(
-            counts.families[:, 0], counts.families[:, 2], counts.niches, counts.families[:, 3]
-        )
-        orphans = (counts.matrix - known.matrix).tocoo()
-        parent, child = (np.repeat(axis, orphans.data).astype(np.int64) for axis in orphans.coords)
-        families, elite = counts.families, np.empty(0, np.int64)
-        if len(families):
-            _, elite = np.unique(families[:, :2], axis=0, return_inverse=True)
-        elite = elite.ravel()
-        size = families[:, 3]
+        *states, number = orphans_of(counts)
+        parent, child = (np.repeat(axis, number) for axis in states)
+        families, size = counts.families, counts.families[:, 3]
         if thin == "elite":
-            place = rng.random(int(elite.max(initial=-1)) + 1)[elite]
+            elite = elites_of(families)
+            place = rng.random(elite.max(initial=-1) + 1)[elite]
             one = size
         else:
             families = np.repeat(families, size, axis=0)
@@ -240,10 +236,8 @@ class _Thinner:
             column[kept] for column in (self._parent, self._elite, self._child, self._size)
         )
         own = elite >= 0
-        pairs, which = np.unique(np.stack([parent[own], elite[own], child[own]]), axis=1, return_inverse=True)
-        children = np.bincount(which.ravel(), size[own], pairs.shape[1]).astype(np.int64)
         counts = TransitionCounts.from_pairs(parent, child, self._counts.niches, size)
-        return replace(counts, families=np.vstack([pairs, children]).T)
+        return replace(counts, families=tabulated(parent[own], elite[own], child[own], size[own]))
 
 
 def _agreement(first: Floats, second: Floats) -> float:

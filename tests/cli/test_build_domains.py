@@ -5,7 +5,7 @@ import pytest
 import nichechain as nc
 from nichechain.cli import main
 from nichechain.cli.build import BuildCommand
-from nichechain.cli.console import parse
+from nichechain.cli.parsing import parse
 
 
 @pytest.mark.parametrize(

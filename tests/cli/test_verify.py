@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from nichechain.archive.read import checksum
-from nichechain.cli import console, verify
+from nichechain.cli import progress, verify
 from nichechain.core.errors import ArchiveError, NichechainError
 from nichechain.core.machine import library_versions
 
@@ -119,8 +119,8 @@ def test_progress_lines_tell_rate_and_time_left(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     now = 0.0
-    monkeypatch.setattr(console.time, "monotonic", lambda: now)
-    with console.stages() as tell:
+    monkeypatch.setattr(progress.time, "monotonic", lambda: now)
+    with progress.stages() as tell:
         tell("evaluations", 0, 100)
         now = 11.0
         tell("evaluations", 22, 100)
@@ -136,7 +136,7 @@ def test_progress_bars_on_a_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
     shown = io.StringIO()
     terminal = rich.console.Console(file=shown, force_terminal=True, width=100)
     monkeypatch.setattr(rich.console, "Console", lambda **_: terminal)
-    with console.stages() as tell:
+    with progress.stages() as tell:
         tell("search", 0, 7)
         tell("search", 7, 7)
         tell("evaluations", 1, 20)

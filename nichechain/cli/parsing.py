@@ -1,0 +1,153 @@
+"""How commands read options: a typed dataclass each, values out of text, options that many share."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import fields
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias, TypeVar
+
+import tyro
+
+from nichechain.core.errors import NichechainError
+
+if TYPE_CHECKING:
+    from nichechain.core.checks import DomainOption
+
+Command = TypeVar("Command")
+
+ArchivePath: TypeAlias = Annotated[
+    str,
+    tyro.conf.Positional,
+    tyro.conf.arg(
+        metavar="PATH", help="Archive folder, or the name of an archive that ships with nichechain."
+    ),
+]
+EstimatorName: TypeAlias = Literal["empirical-bayes", "dirichlet", "mle"]
+Workers: TypeAlias = Annotated[
+    str | None,
+    tyro.conf.arg(
+        metavar="WORKERS",
+        help="Who evaluates: a number of threads, processes:N, ray or ray://HOST:PORT. "
+        "The result is the same.",
+        help_behavior_hint="(default: one thread per processor)",
+    ),
+]
+CacheMemory: TypeAlias = Annotated[
+    str | None,
+    tyro.conf.arg(
+        metavar="SIZE",
+        help="Memory on each machine for physics that was computed before, such as 500MB, or 0 for none. "
+        "The result is the same.",
+        help_behavior_hint="(default: 2GiB)",
+    ),
+]
+
+
+def parse(
+    command: Callable[..., Command],
+    arguments: Sequence[str],
+    default: Command | None = None,
+    name: str | None = None,
+) -> Command:
+    """Read a command's options; exits with status 2 and a message if they are not well-formed.
+
+    Parameters
+    ----------
+    command : dataclass
+    arguments : sequence of str
+    default : instance, optional
+        Values of the options that are not given.
+    name : str, optional
+        What the command is called, by default as its class without ``Command``.
+
+    Raises
+    ------
+    NichechainError
+        If a text is not what :func:`parsed` wants.
+    """
+    name = name or called(command)
+    if "--json" in arguments and any(f.name == "format" for f in fields(command)):  # type: ignore[arg-type]
+        # The one spelling that every command with a table knows.
+        place = list(arguments).index("--json")
+        arguments = [*arguments[:place], "--format", "json", *arguments[place + 1 :]]
+    given = {} if default is None else {"default": default}
+    try:
+        read: Command = tyro.cli(  # type: ignore[call-overload]
+            command,
+            prog=f"nichechain {name}",
+            args=list(arguments),
+            config=(tyro.conf.FlagCreatePairsOff,),
+            **given,
+        )
+    except _Refused as refused:
+        raise refused.error from None
+    return read
+
+
+def called(command: Callable[..., Command]) -> str:
+    """What users call a command, from the name of its class."""
+    return command.__name__.removesuffix("Command").lower()
+
+
+def option(metavar: str, default: str) -> Any:
+    """How the help shows an option whose default is worked out later."""
+    return tyro.conf.arg(metavar=metavar, help_behavior_hint=f"(default: {default})")
+
+
+def parsed(option: str, read: Callable[[str, str], Any]) -> Any:
+    """An option whose value is made of a text, by what refuses a bad one under the option's name.
+
+    Parameters
+    ----------
+    option : str
+    read : callable
+        Told the text and the option; raises :class:`NichechainError`.
+    """
+
+    def convert(words: list[str]) -> Any:
+        try:
+            return read(words[0], option)
+        except NichechainError as error:
+            raise _Refused(error) from None
+
+    return tyro.constructors.PrimitiveConstructorSpec(
+        1, "TEXT", convert, lambda _: True, lambda value: [str(value)]
+    )
+
+
+class _Refused(Exception):  # noqa: N818  # carries an error past tyro, which would frame a ValueError
+    def __init__(self, error: NichechainError) -> None:
+        super().__init__(str(error))
+        self.error = error
+
+
+def words(text: str | None) -> tuple[str, ...]:
+    """``"a, b"`` as ``("a", "b")``; nothing of no text."""
+    return () if text is None else tuple(word.strip() for word in text.split(",") if word.strip())
+
+
+def domain_options(texts: Sequence[str]) -> dict[str, DomainOption]:
+    """``["joints=20"]`` as ``{"joints": 20}``."""
+    return dict(_domain_option(text) for text in texts)
+
+
+def domain_option_texts(options: Mapping[str, DomainOption]) -> tuple[str, ...]:
+    """What :func:`domain_options` reads as these options."""
+    return tuple(
+        f"{name}={str(value).lower() if isinstance(value, bool) else value}"
+        for name, value in options.items()
+    )
+
+
+def _domain_option(text: str) -> tuple[str, DomainOption]:
+    name, equals, value = text.partition("=")
+    if not name or not equals:
+        raise NichechainError(f"option {text!r} of the domain must be NAME=VALUE, such as joints=20")
+    if value in ("true", "false"):
+        return name, value == "true"
+    for kind in (int, float):
+        try:
+            return name, kind(value)
+        except ValueError:
+            continue
+    return name, value

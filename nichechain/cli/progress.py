@@ -1,0 +1,220 @@
+"""How commands show that they work: bars on a terminal, plain lines now and then elsewhere."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.progress import Progress, TaskID
+
+    from nichechain.archive.filling import BuildProgress
+
+# Seconds between progress lines where there is no terminal to redraw.
+_LINE_EVERY = 10.0
+
+
+def leave_at_next_interrupt() -> None:
+    """Have Ctrl-C end the process at once: all is kept, and only a rollout is still waited for."""
+    import os
+    import signal
+
+    signal.signal(signal.SIGINT, lambda *_: os._exit(130))
+
+
+def spinner(text: str) -> Any:
+    """Something that turns while a thing is loaded; nothing where there is no terminal."""
+    from rich.console import Console
+
+    return Console(stderr=True).status(text)
+
+
+@contextmanager
+def build_progress(total: int) -> Iterator[Callable[[BuildProgress], None]]:
+    """A bar of births on standard error; plain lines now and then where that is no terminal."""
+    from rich.console import Console
+
+    shown, clock, lines = Console(stderr=True), _Clock(), _Lines()
+    if not shown.is_terminal:
+
+        def line(now: BuildProgress) -> None:
+            clock.begin(now.births)
+            if lines.due():
+                left = clock.seconds_left(now.births, total)
+                _say(
+                    f"{now.births} of {total} births, {clock.rate(now.births)}/s, {now.filled} niches "
+                    f"filled, {now.outside} outside, {now.failed} failed, {left:.0f} s left"
+                )
+
+        yield line
+        return
+    fields = ("{task.fields[rate]}/s", "{task.fields[filled]} niches", "{task.fields[outside]} outside")
+    with _bar(shown, *fields, "{task.fields[failed]}") as bar:
+        task = bar.add_task("", total=total, rate="-", filled=0, outside=0, failed="")
+
+        def tell(now: BuildProgress) -> None:
+            clock.begin(now.births)
+            bar.update(
+                task,
+                completed=now.births,
+                rate=clock.rate(now.births),
+                filled=now.filled,
+                outside=now.outside,
+                failed=f"{now.failed} failed" if now.failed else "",
+            )
+
+        yield tell
+
+
+@contextmanager
+def counting(total: int, what: str) -> Iterator[Callable[[int], None]]:
+    """A bar with rate and time left, for anything that is counted; lines where it cannot be drawn.
+
+    Parameters
+    ----------
+    total : int
+        How many there will be.
+    what : str
+        Of what, such as ``evaluations``.
+
+    Yields
+    ------
+    callable
+        Told how many are done.
+    """
+    from rich.console import Console
+
+    shown, clock, lines = Console(stderr=True), _Clock(), _Lines()
+    if not shown.is_terminal:
+
+        def line(done: int) -> None:
+            clock.begin(done)
+            if lines.due():
+                left = clock.seconds_left(done, total)
+                _say(f"{done} of {total} {what}, {clock.rate(done)}/s, {left:.0f} s left")
+
+        yield line
+        return
+    with _bar(shown, f"{what}, {{task.fields[rate]}}/s") as bar:
+        task = bar.add_task("", total=total, rate="-")
+
+        def draw(done: int) -> None:
+            clock.begin(done)
+            bar.update(task, completed=done, rate=clock.rate(done))
+
+        yield draw
+
+
+@contextmanager
+def adding(total: int, what: str) -> Iterator[Callable[[int], None]]:
+    """As :func:`counting`, but told how many more are done."""
+    done = 0
+    with counting(total, what) as tell:
+
+        def more(number: int) -> None:
+            nonlocal done
+            done += number
+            tell(done)
+
+        yield more
+
+
+@contextmanager
+def stages() -> Iterator[Callable[[str, int, int], None]]:
+    """A bar for each stage of some work, on standard error; plain lines where that is no terminal.
+
+    Yields
+    ------
+    callable
+        Told the stage, and how many of how many are done.
+    """
+    from rich.console import Console
+
+    shown, lines = Console(stderr=True), _Lines()
+    clocks: dict[str, _Clock] = {}
+    if not shown.is_terminal:
+
+        def line(stage: str, done: int, total: int) -> None:
+            clock = clocks.setdefault(stage, _Clock())
+            clock.begin(done)
+            if done and lines.due():
+                left = clock.seconds_left(done, total)
+                _say(f"{stage}: {done} of {total}, {clock.rate(done)}/s, {left:.0f} s left")
+
+        yield line
+        return
+    with _bar(shown, "{task.fields[rate]}/s", named=True) as bar:
+        tasks: dict[str, TaskID] = {}
+
+        def tell(stage: str, done: int, total: int) -> None:
+            if stage not in tasks:
+                tasks[stage] = bar.add_task(stage, total=total, rate="-")
+                clocks[stage] = _Clock()
+                clocks[stage].begin(done)
+            bar.update(tasks[stage], completed=done, rate=clocks[stage].rate(done))
+
+        yield tell
+
+
+def _bar(shown: Console, *texts: str, named: bool = False) -> Progress:
+    """A bar with such columns between how much is done and how long the rest will take."""
+    from rich import progress
+
+    return progress.Progress(
+        *((progress.TextColumn("{task.description}"),) if named else ()),
+        progress.BarColumn(bar_width=None),
+        progress.MofNCompleteColumn(),
+        *map(progress.TextColumn, texts),
+        progress.TimeRemainingColumn(compact=True),
+        progress.TextColumn("left"),
+        console=shown,
+    )
+
+
+def _say(text: str) -> None:
+    print(text, file=sys.stderr, flush=True)
+
+
+class _Lines:
+    """When the next line may be written."""
+
+    def __init__(self) -> None:
+        self._last = time.monotonic()
+
+    def due(self) -> bool:
+        """Whether it may now; the next one then waits its time."""
+        if time.monotonic() - self._last < _LINE_EVERY:
+            return False
+        self._last = time.monotonic()
+        return True
+
+
+class _Clock:
+    """Births a second since it began."""
+
+    def __init__(self) -> None:
+        self._began: tuple[float, int] | None = None
+
+    def begin(self, births: int) -> None:
+        """Start the clock; later calls change nothing."""
+        if self._began is None:
+            self._began = time.monotonic(), births
+
+    def _speed(self, births: int) -> float:
+        assert self._began is not None
+        began, first = self._began
+        return (births - first) / max(1e-9, time.monotonic() - began)
+
+    def rate(self, births: int) -> str:
+        """Births a second, to three digits or so."""
+        speed = self._speed(births)
+        return f"{speed:.1f}" if speed < 100 else f"{speed:.0f}"
+
+    def seconds_left(self, births: int, total: int) -> float:
+        """Time that the rest will take at this speed."""
+        speed = self._speed(births)
+        return (total - births) / speed if speed else 0.0 if births >= total else float("inf")
