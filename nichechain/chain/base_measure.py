@@ -1,7 +1,8 @@
 """Where children land before we know whose they are: the base measure of a Dirichlet row.
 
-Three guesses, mixed: (a) where children land anywhere, (b) as far from the parent as children
-land anywhere, (c) anywhere alike. A niche of few births borrows from them.
+Guesses that all niches share, mixed: (a) where children land anywhere, (b) as far from the parent as
+children land anywhere, (c) anywhere alike; and beside them what births of neighbouring niches say. A
+niche of few births borrows from them.
 """
 
 from __future__ import annotations
@@ -25,7 +26,9 @@ Ints = NDArray[np.int64]
 
 @dataclass(frozen=True)
 class BaseMeasure:
-    """Rows B_i, pooled over all births, as three components and their weights.
+    """Rows B_i, pooled over births: three components with their weights, and what neighbours say.
+
+    B_i = near_i + (1 − Σ_j near_ij) (w_1 destination + w_2 displacement_i + w_3 / S).
 
     Parameters
     ----------
@@ -39,6 +42,8 @@ class BaseMeasure:
         Share of births outside, among births of parents inside.
     weights : (3,) float64 array
         Of destination, displacement and uniform.
+    near : (S, S) scipy.sparse.csr_array, optional
+        The part of every row that neighbours speak for, which sums to less than 1; by default none.
     """
 
     niches: Niches
@@ -46,26 +51,51 @@ class BaseMeasure:
     displacement: Displacement
     leaving: float
     weights: Floats
+    near: sparse.csr_array | None = None
 
     @classmethod
     def pooled(cls, counts: TransitionCounts, weights: Floats) -> BaseMeasure:
-        """The base measure of these counts, with the given weights."""
-        niches = counts.niches
-        n = len(niches)
+        """The base measure in which each component is made of all births, with the given weights."""
         entries = counts.matrix.tocoo()
-        parent, child, count = entries.coords[0], entries.coords[1], entries.data
+        parent, child = (axis.astype(np.int64) for axis in entries.coords)
+        births = entries.data.astype(np.float64)
+        return cls.of_births(counts.niches, parent, child, births, births, weights)
+
+    @classmethod
+    def of_births(
+        cls,
+        niches: Niches,
+        parent: Ints,
+        child: Ints,
+        landing: Floats,
+        moving: Floats,
+        weights: Floats,
+        near: sparse.csr_array | None = None,
+    ) -> BaseMeasure:
+        """The base measure of pairs of states, each of which stands for some births of either kind.
+
+        Parameters
+        ----------
+        niches : Niches
+        parent, child : (E,) int64 arrays
+        landing, moving : (E,) float64 arrays
+            Births of each pair that destination, and that displacement is made of.
+        weights, near
+            As in :class:`BaseMeasure`.
+        """
+        n = len(niches)
         # One imaginary birth, spread over all states, keeps every share positive.
-        destination = np.bincount(child, count, niches.states) + 1.0 / niches.states
+        destination = np.bincount(child, landing, niches.states) + 1.0 / niches.states
         inside = (parent < n) & (child < n)
-        apart = parent[inside].astype(np.int64), child[inside].astype(np.int64), count[inside]
+        apart = parent[inside], child[inside], moving[inside]
         displacement: Displacement
         if isinstance(niches, GridNiches):
             displacement = GridDisplacement.pooled(niches, *apart)
         else:
             displacement = DistanceDisplacement.pooled(niches, *apart)
-        left = count[(parent < n) & (child >= n)].sum() if niches.states > n else 0
-        leaving = left / max(1, left + count[inside].sum())
-        return cls(niches, destination / destination.sum(), displacement, float(leaving), weights)
+        left = moving[(parent < n) & (child >= n)].sum()
+        leaving = left / max(1.0, left + moving[inside].sum())
+        return cls(niches, destination / destination.sum(), displacement, float(leaving), weights, near)
 
     def components(self, parent: Ints, child: Ints) -> Floats:
         """Probability of each pair under each component, (3, N).
@@ -85,13 +115,28 @@ class BaseMeasure:
     def probability(self, parent: Ints, child: Ints) -> Floats:
         """B_ij for each pair, (N,)."""
         mixed: Floats = self.weights @ self.components(parent, child)
+        if self.near is not None and parent.size:
+            mixed *= self.shared[parent]
+            mixed += np.asarray(self.near[parent, child]).ravel()
         return mixed
 
     def rows(self, parent: Ints) -> Floats:
         """Whole rows B_i, (N, S)."""
         states = np.arange(self.niches.states)
         pairs = np.repeat(parent, states.size), np.tile(states, parent.size)
-        return self.probability(*pairs).reshape(parent.size, states.size)
+        mixed = (self.weights @ self.components(*pairs)).reshape(parent.size, states.size)
+        if self.near is not None and parent.size:
+            mixed *= self.shared[parent, None]
+            mixed += self.near[parent].toarray()
+        return mixed
+
+    @cached_property
+    def shared(self) -> Floats:
+        """The part of every row that is left to the components, (S,)."""
+        if self.near is None:
+            return np.ones(self.niches.states)
+        left: Floats = np.maximum(1.0 - np.asarray(self.near.sum(axis=1)).ravel(), 0.0)
+        return left
 
     def sample(self, parent: Ints, rng: np.random.Generator) -> Ints:
         """One state drawn from B_i for each parent state, any shape."""
@@ -103,6 +148,9 @@ class BaseMeasure:
         child[uniform] = rng.integers(self.niches.states, size=int(uniform.sum()))
         displaced = np.flatnonzero((kind >= pooled) & ~uniform)
         child[displaced] = self._sample_displaced(flat[displaced], rng)
+        if self.near is not None:
+            told = np.flatnonzero(rng.random(flat.size) >= self.shared[flat])
+            child[told] = self._neighbours.draw(flat[told], rng)
         return child.reshape(parent.shape)
 
     def _displaced(self, parent: Ints, child: Ints) -> Floats:
@@ -117,6 +165,10 @@ class BaseMeasure:
     @cached_property
     def _destinations(self) -> RowSampler:
         return RowSampler(sparse.csr_array(self.destination[None, :]))
+
+    @cached_property
+    def _neighbours(self) -> RowSampler:
+        return RowSampler(self.near)
 
     @property
     def within(self) -> Floats:

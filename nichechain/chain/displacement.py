@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,9 +13,6 @@ from scipy.signal import fftconvolve
 
 from nichechain.core.row_sampler import RowSampler
 from nichechain.niches import GridNiches
-
-if TYPE_CHECKING:
-    from nichechain.chain.counts import TransitionCounts
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -61,22 +58,6 @@ class Displacement(Protocol):
         """
         ...
 
-    def without_parent(
-        self, counts: TransitionCounts, parent: Ints, child: Ints, share: Floats
-    ) -> tuple[Floats, Floats]:
-        """Weights of some pairs, and of all children, as births of other parents give them, (N,) each.
-
-        Parameters
-        ----------
-        counts : TransitionCounts
-            Those that the weights are made of.
-        parent, child : (N,) int64 arrays
-            Niches.
-        share : (N,) float64 array
-            K_ij / Σ_j K_ij of the pairs.
-        """
-        ...
-
 
 @dataclass(frozen=True)
 class GridDisplacement:
@@ -93,7 +74,7 @@ class GridDisplacement:
     kernel: Floats
 
     @classmethod
-    def pooled(cls, niches: GridNiches, parent: Ints, child: Ints, count: Ints) -> GridDisplacement:
+    def pooled(cls, niches: GridNiches, parent: Ints, child: Ints, count: Ints | Floats) -> GridDisplacement:
         """Displacements of births from niche to niche."""
         kernel = np.zeros(tuple(2 * k - 1 for k in niches.shape))
         np.add.at(kernel, _cells_apart(niches, parent, child), count)
@@ -150,17 +131,6 @@ class GridDisplacement:
     def own(self, parent: Ints, child: Ints) -> tuple[Floats, Floats]:  # noqa: ARG002
         """Ones: of all niches, one alone is displaced from the parent like this."""
         return np.ones(parent.size), np.ones(parent.size)
-
-    def without_parent(
-        self, counts: TransitionCounts, parent: Ints, child: Ints, share: Floats
-    ) -> tuple[Floats, Floats]:
-        """See :class:`Displacement`; weights are in births."""
-        n = len(self.niches)
-        kept = np.asarray(counts.matrix[:n, :n].sum(axis=1), np.float64).ravel()
-        # A row's own births inside are all among those that its kernel keeps in the grid.
-        within = self.within[parent] * (kept.sum() + 0.5)
-        count = np.asarray(counts.matrix[parent, child]).ravel().astype(np.float64)
-        return share * within - count, within - kept[parent]
 
     @cached_property
     def _moves(self) -> RowSampler:

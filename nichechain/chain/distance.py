@@ -5,15 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from nichechain.niches import Niches
-
-if TYPE_CHECKING:
-    from nichechain.chain.counts import TransitionCounts
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -54,7 +50,7 @@ class DistanceDisplacement:
     exposure: Floats
 
     @classmethod
-    def pooled(cls, niches: Niches, parent: Ints, child: Ints, count: Ints) -> DistanceDisplacement:
+    def pooled(cls, niches: Niches, parent: Ints, child: Ints, count: Ints | Floats) -> DistanceDisplacement:
         """Distances of births from niche to niche."""
         n, axes = niches.centers.shape
         spans = niches.upper - niches.lower
@@ -128,23 +124,6 @@ class DistanceDisplacement:
         # It adds 1 / E_b to weights that are multiplied by all births to be in births.
         pair = self.births.sum() / np.where(self.exposure[shell] > 0, self.exposure[shell], 1.0)
         return pair, pair * self.shells[parent, shell]
-
-    def without_parent(
-        self, counts: TransitionCounts, parent: Ints, child: Ints, share: Floats
-    ) -> tuple[Floats, Floats]:
-        """See :class:`Displacement <nichechain.chain.displacement.Displacement>`."""
-        n, number = self.shells.shape
-        entries = counts.matrix[:n, :n].tocoo()
-        start, end = (axis.astype(np.int64) for axis in entries.coords)
-        shell = _shell(self.niches, start, end, self.width)
-        births = np.bincount(start * number + shell, entries.data, n * number).reshape(n, number)
-        others = np.maximum(self.exposure - births.sum(axis=1)[:, None] * self.shells, 0.0)
-        rate = np.divide(self.births - births, others, out=np.zeros_like(others), where=others > 0)
-        away = _shell(self.niches, parent, child, self.width)
-        whole = (rate * self.shells).sum(axis=1)
-        # A shell that only the parent itself has leaves nothing to go by but its share so far.
-        alone = whole[parent] <= 0.0
-        return np.where(alone, share, rate[parent, away]), np.where(alone, 1.0, whole[parent])
 
     @cached_property
     def _whole(self) -> Floats | None:

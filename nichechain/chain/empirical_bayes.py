@@ -8,24 +8,22 @@ that it has not seen.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import minimize
-from scipy.special import softmax
+from scipy.optimize import minimize_scalar
 
 from nichechain.births.families import elites_of
-from nichechain.chain.base_measure import BaseMeasure
 from nichechain.chain.counts import TransitionCounts
 from nichechain.chain.families import orphans_of
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-# No component's weight goes below this, so that nothing is impossible.
-_FLOOR = 0.005
-_EVEN = np.array([0.5, 0.5 - _FLOOR, _FLOOR])
+_LOG_STRENGTHS = (-7.0, 9.0)
+_MOST_ERROR = 1.0
 
 
 def sibling_correlation(counts: TransitionCounts) -> float:
@@ -71,52 +69,54 @@ def design_effect(counts: TransitionCounts) -> Floats:
     return effect
 
 
-def most_likely(
-    counts: TransitionCounts, effect: Floats, strength: float | None = None
-) -> tuple[float, Floats]:
-    """Strength and mixture under which rows best foretell the children of elites they have not seen.
+def strength_of(counts: TransitionCounts, base: Callable[[Ints, Ints], Floats]) -> tuple[float, float]:
+    """The strength under which rows best foretell the children of elites they have not seen.
 
     Parameters
     ----------
     counts : TransitionCounts
-    effect : (S,) float64 array
-        Design effect of every row: its counts are divided by it.
-    strength : float, optional
-        Fixed where it is given.
+    base : callable
+        B_ij of pairs (N,) of parent and child, as all other rows' births give it.
 
     Returns
     -------
     strength : float
-    weights : (3,) float64 array
-        Of the components of :class:`BaseMeasure`.
+    error : float
+        Standard error of its logarithm.
 
     Notes
     -----
     Maximises Σ_e Σ_j c_ej log T_ij with T_ij = ((C_ij − c_ej)/e_i + s B_ij) / ((N_i − m_e)/e_i + s):
-    every elite's children are foretold by the posterior mean of its niche's row without them, and
-    B by all other rows' births. The marginal likelihood of the counts would take the likeness of
-    siblings for a difference between niches, and find too small a strength.
+    every elite's children are foretold by the posterior mean of its niche's row without them. e_i is
+    the design effect of the births that are left, which the elite's own family has no part in. The
+    marginal likelihood of the counts would take the likeness of siblings for a difference between
+    niches, and find too small a strength. The error is that of estimating equations, summed over
+    elites (Huber 1967), as an elite's children are not independent.
     """
     left = _left_out(counts)
     if not left.parent.size:
-        return strength or 1.0, _EVEN
-    components = _without_own(counts, left.parent, left.child)
+        return 1.0, 0.0
+    probability = base(left.parent, left.child)
+    pairs, _ = _siblings(counts)
+    own = left.family * (left.family - 1)
+    size = counts.births[left.parent] - left.family
+    effect = 1.0 + sibling_correlation(counts) * (pairs[left.parent] - own) / np.maximum(1, size)
     count = np.asarray(counts.matrix[left.parent, left.child]).ravel()
-    others = (count - left.children) / effect[left.parent]
-    size = (counts.births[left.parent] - left.family) / effect[left.parent]
+    others, size = (count - left.children) / effect, size / effect
 
-    def unpack(x: Floats) -> tuple[float, Floats]:
-        weights = _FLOOR + (1.0 - 3.0 * _FLOOR) * softmax(np.append(x[1:], 0.0))
-        s = strength if strength is not None else float(np.exp(np.clip(x[0], -7.0, 12.0)))
-        return s, weights
+    def foretold(log_strength: float) -> Floats:
+        s = float(np.exp(log_strength))
+        logs: Floats = left.weight * np.log((others + s * probability) / (size + s))
+        return logs
 
-    def loss(x: Floats) -> float:
-        s, weights = unpack(x)
-        foretold = (others + s * (weights @ components)) / (size + s)
-        return -float((left.weight * np.log(foretold)).sum())
-
-    best = minimize(loss, np.array([2.0, 2.0, 2.0]), method="Nelder-Mead", options={"maxiter": 400})
-    return unpack(best.x)
+    best = minimize_scalar(lambda x: -foretold(x).sum(), bounds=_LOG_STRENGTHS, method="bounded").x
+    step = 0.05
+    below, here, above = (foretold(best + shift) for shift in (-step, 0.0, step))
+    bend = -(above - 2.0 * here + below).sum() / step**2
+    slopes = np.bincount(left.elite, (above - below) / (2.0 * step))
+    # Where s is so large that rows are all base, the likelihood is flat and its size makes no difference.
+    error = _MOST_ERROR if bend <= 0 else min(_MOST_ERROR, float(np.sqrt((slopes**2).sum()) / bend))
+    return float(np.exp(best)), error
 
 
 @dataclass(frozen=True)
@@ -133,6 +133,8 @@ class _LeftOut:
         All its children.
     weight : (E,) int64 array
         Births that this speaks for.
+    elite : (E,) int64 array
+        A number of the elite.
     """
 
     parent: Ints
@@ -140,6 +142,7 @@ class _LeftOut:
     children: Ints
     family: Ints
     weight: Ints
+    elite: Ints
 
 
 def _left_out(counts: TransitionCounts) -> _LeftOut:
@@ -155,6 +158,7 @@ def _left_out(counts: TransitionCounts) -> _LeftOut:
         np.concatenate([children, alone]),
         np.concatenate([family, alone]),
         np.concatenate([children, number]),
+        np.concatenate([elite, elite.max(initial=-1) + 1 + np.arange(number.size)]).astype(np.int64),
     )
 
 
@@ -169,29 +173,3 @@ def _siblings(counts: TransitionCounts) -> tuple[Ints, Ints]:
     pairs = np.bincount(owner, family * (family - 1), states)
     matches = np.bincount(parent, children * (children - 1), states)
     return pairs.astype(np.int64), matches.astype(np.int64)
-
-
-def _without_own(counts: TransitionCounts, parent: Ints, child: Ints) -> Floats:
-    """Components at each pair of the base that all other rows' births would give, (3, E)."""
-    base = BaseMeasure.pooled(counts, _EVEN)
-    destination, displaced, uniform = base.components(parent, child)
-    n = len(counts.niches)
-    count = np.asarray(counts.matrix[parent, child]).ravel().astype(np.float64)
-    births = counts.births.astype(np.float64)
-    every = births.sum() + 1.0
-    destination = (destination * every - count) / (every - births[parent])
-    # Of every row, the births that stayed in the grid and those that left it.
-    kept = np.asarray(counts.matrix[:, :n].sum(axis=1), np.float64).ravel()
-    kept[n:] = 0.0
-    gone = births - kept
-    gone[n:] = 0.0
-    leaving = (gone.sum() - gone) / np.maximum(1.0, (gone + kept).sum() - gone - kept)
-    inside = (parent < n) & (child < n)
-    rows = parent[inside]
-    share, whole = base.displacement.without_parent(
-        counts, rows, child[inside], displaced[inside] / (1.0 - base.leaving)
-    )
-    displaced = np.where(parent < n, leaving[parent], destination)
-    displaced[inside] = (1.0 - leaving[rows]) * share / whole
-    # Where only the row itself ever did such a thing, the uniform share is all there is.
-    return np.maximum([destination, displaced, uniform], 1e-12)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Literal, get_args
 
 import numpy as np
@@ -10,10 +11,10 @@ from scipy import sparse
 
 from nichechain.chain.base_measure import BaseMeasure
 from nichechain.chain.counts import TransitionCounts
-from nichechain.chain.empirical_bayes import design_effect, most_likely
 from nichechain.chain.model import NicheChain, Transition
 from nichechain.chain.operator import PooledTransition
 from nichechain.chain.posterior import DirichletPosterior
+from nichechain.chain.prior import fit_prior
 from nichechain.core.checks import check_choice, check_positive
 from nichechain.core.errors import NichechainError
 
@@ -138,13 +139,19 @@ def _dirichlet(counts: TransitionCounts, strength: float | str) -> NicheChain:
 
 
 def _empirical_bayes(counts: TransitionCounts, strength: float | None) -> NicheChain:
-    effect = design_effect(counts)
-    fitted, weights = most_likely(counts, effect, None if strength is None else _positive(strength))
-    posterior = DirichletPosterior(counts, BaseMeasure.pooled(counts, weights), fitted, effect)
+    prior = fit_prior(counts, None if strength is None else _positive(strength))
+    effect = prior.design_effect
+    posterior = DirichletPosterior(counts, prior.base, prior.strength, effect, prior)
     births = counts.births
     typical = (births * effect).sum() / max(1, births.sum())
     related = f", {typical:.2g} births count as one" if typical >= 1.05 else ""
-    return with_posterior(counts, posterior, f"empirical-bayes, strength {fitted:.3g}{related}")
+    return with_posterior(counts, posterior, f"empirical-bayes, strength {prior.strength:.3g}{related}")
+
+
+def refitted(posterior: DirichletPosterior, counts: TransitionCounts) -> DirichletPosterior:
+    """The same strength and design effect for other counts, and the base measure that these give."""
+    base = fit_prior(counts, posterior.strength).base
+    return replace(posterior, counts=counts, base=base, prior=None)
 
 
 def with_posterior(counts: TransitionCounts, posterior: DirichletPosterior, name: str) -> NicheChain:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -13,6 +13,7 @@ from scipy import sparse
 from nichechain.chain.base_measure import BaseMeasure
 from nichechain.chain.counts import TransitionCounts
 from nichechain.chain.operator import PooledTransition
+from nichechain.chain.prior import FittedPrior
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -43,12 +44,15 @@ class DirichletPosterior:
         s, the number of births that the base measure is worth.
     design_effect : (S,) float64 array
         e, the number of births of each row that are worth one independent birth.
+    prior : FittedPrior, optional
+        Where B and s come from: then every draw has a base measure and a strength of its own.
     """
 
     counts: TransitionCounts
     base: BaseMeasure
     strength: float
     design_effect: Floats
+    prior: FittedPrior | None = None
 
     @cached_property
     def weights(self) -> sparse.csr_array:
@@ -95,6 +99,9 @@ class DirichletPosterior:
         with weights and a share left to B itself that give it the mean and the covariances of
         Dirichlet(s B), though not the higher moments, and T is a :class:`PooledTransition`.
         """
+        if self.prior is not None:
+            base, strength = self.prior.draw(rng)
+            return replace(self, base=base, strength=strength, prior=None).draw(rng)
         matrix = self.weights.tocoo()
         rows, columns = matrix.coords
         births = self.counts.births / self.design_effect

@@ -97,12 +97,14 @@ def _estimate(command: EstimateCommand, archive: Archive) -> None:
     }
     if posterior is not None:
         destination, displacement, uniform = posterior.base.weights.tolist()
+        neighbours = float(1.0 - posterior.base.shared.mean())
         effect = float((counts.births * posterior.design_effect).sum() / max(1, births))
         content |= {
             "strength": posterior.strength,
             "weight_destination": destination,
             "weight_displacement": displacement,
             "weight_uniform": uniform,
+            "share_neighbours": neighbours,
             "births_worth_one": effect,
         }
     if command.format == "table":
@@ -117,9 +119,10 @@ def _estimate(command: EstimateCommand, archive: Archive) -> None:
         if posterior is not None:
             rows |= {
                 "strength of the base": f"{posterior.strength:.3g} births",
-                "  where children land": f"{destination:.1%}",
-                "  how far they land": f"{displacement:.1%}",
-                "  anywhere": f"{uniform:.1%}",
+                "  what neighbours say": f"{neighbours:.1%}",
+                "  where children land": f"{(1.0 - neighbours) * destination:.1%}",
+                "  how far they land": f"{(1.0 - neighbours) * displacement:.1%}",
+                "  anywhere": f"{(1.0 - neighbours) * uniform:.1%}",
                 "births worth one": f"{effect:.3g}: children of one elite take after each other"
                 if effect > 1
                 else "1: every birth counts in full",
@@ -206,7 +209,7 @@ def _stability(command: EstimateCommand, archive: Archive) -> None:
 
 
 def _draw(found: RankStability, out: Path) -> None:
-    from nichechain.plots.stability import plot_stability
+    from nichechain.plots.validation import plot_stability
 
     figure = output.new_figure(6.4, 4.8)
     plot_stability(found, figure.add_subplot())

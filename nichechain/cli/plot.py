@@ -106,7 +106,7 @@ def _draw_pair(command: PlotCommand, archive: Archive, left: Axes, right: Axes) 
     chain = archive.chain(command.estimator)
     if command.kind == "uncertainty":
         from nichechain.plots import plot_evolvability
-        from nichechain.plots.uncertainty import plot_uncertainty
+        from nichechain.plots.maps import plot_uncertainty
 
         scores = niche_evolvability(chain, l=command.l, lineages=command.lineages)
         plot_evolvability(archive, scores, left, min_births=command.min_births)
@@ -152,7 +152,7 @@ def _draw(command: PlotCommand, archive: Archive, ax: Axes) -> None:
         case "reach":
             from nichechain.evolvability.reach import reach
             from nichechain.niches import parse_niche
-            from nichechain.plots.reach import plot_reach
+            from nichechain.plots.maps import plot_reach
 
             assert command.niche is not None
             chain = archive.chain(command.estimator)
@@ -161,7 +161,7 @@ def _draw(command: PlotCommand, archive: Archive, ax: Axes) -> None:
             plot_reach(archive, found, ax, niche=niche)
         case "wormholes":
             from nichechain.chain.structure.wormholes import wormholes
-            from nichechain.plots.wormholes import plot_wormholes
+            from nichechain.plots.graphs import plot_wormholes
 
             # Broken children all land at the start, which is no secret passage.
             plot_wormholes(archive, wormholes(archive.chain(command.estimator), beyond="both"), ax)

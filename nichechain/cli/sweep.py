@@ -139,7 +139,7 @@ def _check(command: SweepCommand) -> None:
 
 
 def _draw(found: nichechain.validation.grid_size.Sweep, out: Path) -> None:
-    from nichechain.plots.sweep import plot_filling, plot_scores, plot_surprise
+    from nichechain.plots.validation import plot_filling, plot_scores, plot_surprise
 
     figure = output.new_figure(15.0, 5.0)
     left, middle, right = figure.subplots(1, 3, gridspec_kw={"wspace": 0.28})

@@ -71,7 +71,7 @@ def run(arguments: Sequence[str]) -> int:
 
 def _draw(result: Validation, out: Path) -> None:
     """Calibration after one generation and after all, and the means over generations."""
-    from nichechain.plots.calibration import plot_calibration, plot_reached
+    from nichechain.plots.validation import plot_calibration, plot_reached
 
     generations = sorted({1, result.config.l})
     figure = output.new_figure(5.0 * (len(generations) + 1), 5.0, layout="constrained")

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import KW_ONLY, dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal, TypeAlias
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
 from nichechain.cli import output, parsing, progress
 from nichechain.core.errors import NichechainError
+from nichechain.studies.settings import MetricName, WalkSettings
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -21,10 +22,6 @@ if TYPE_CHECKING:
     from nichechain.studies.analysis import Analysis
     from nichechain.studies.conditions import Condition
     from nichechain.studies.study import Kind, Study
-
-# As in nichechain.studies, which takes longer to import than help should.
-MetricName: TypeAlias = Literal["knn", "knn-no-archive", "parent", "ancestors", "kde"]
-Mode: TypeAlias = Literal["factor", "length"]
 
 _HELP = """usage: nichechain walks STUDY ...
 
@@ -46,7 +43,7 @@ try:
 
 
 @dataclass(frozen=True)
-class _Walks:
+class _Walks(WalkSettings):
     """What the studies share."""
 
     domain: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="DOMAIN")]
@@ -55,31 +52,6 @@ class _Walks:
     """Folder of the study: walks, tables, figure and report."""
     runs: int = 50
     """Walks of each kind."""
-    offspring: int = 30
-    """Children of a state in each step."""
-    mutation: str = "cauchy"
-    """Mutation operator: cauchy, gaussian, student-t or uniform-ball."""
-    scale: float = 1.0
-    """Scale of the mutation."""
-    step_bound: Annotated[str | None, parsing.option("KIND:SIZE", "unbounded")] = None
-    """How far a child can be from its parent: per-coordinate:2 truncates the noise on every weight,
-    rescaled:50 shortens a step that is longer."""
-    k: int = 15
-    """Neighbours of the kNN metrics."""
-    bandwidth: float = 0.5
-    """Smoothing parameter of the KDE metric."""
-    mode: Mode = "factor"
-    """What it multiplies: the covariance of the behaviors, or nothing (a length in units of behavior)."""
-    decay: float = 1.0
-    """Discount of the KDE metric by age, a factor per step."""
-    archive_limit: int = 1200
-    """Behaviors that a novelty archive holds at most."""
-    archive_scope: Literal["walk", "configuration"] = "walk"
-    """Whether each walk has a novelty archive of its own, or all of a kind share one."""
-    other_niche: bool = False
-    """Only a child in another niche than its parent may follow."""
-    initialisation: str = "domain"
-    """First genotypes: domain, domain:S, normal:S, uniform:S, xavier-normal, ..., or elites:PATH."""
     grid: Annotated[str, tyro.conf.arg(metavar="NXxNY")] = "20x20"
     """Cells of the grid that coverage is measured on."""
     bounds: Annotated[str | None, parsing.option("X0,X1,Y0,Y1", "the domain's")] = None
@@ -94,12 +66,14 @@ class _Walks:
     """Options of the domain, such as joints=20 of the arm, or descriptor=final-xy of a gym:ENV_ID."""
     workers: parsing.Workers = None
     cache_memory: parsing.CacheMemory = None
+    _: KW_ONLY
+    step_bound: Annotated[str | None, parsing.option("KIND:SIZE", "unbounded")] = None
 
     def base(self) -> Condition:
         """What all conditions share."""
         from nichechain.studies.conditions import Condition
 
-        names = {field.name for field in fields(Condition)} & {field.name for field in fields(self)}
+        names = [name for name in Condition.names()[1:] if hasattr(self, name)]
         return Condition(label="base", **{name: getattr(self, name) for name in names})
 
 
@@ -296,13 +270,14 @@ def command_of(study: Study, folder: Path) -> str:
         varied = base.label.partition(" ")[0]
         options["vary"] = next(name for name, change in VARIATIONS.items() if varied in change)
     flags = ["paired"] if study.paired else []
-    for field in fields(Condition)[1:]:
-        value = getattr(base, field.name)
-        if field.name != varied and value != field.default:
+    usual = Condition(label="usual")
+    for name in Condition.names()[1:]:
+        value = getattr(base, name)
+        if name != varied and value != getattr(usual, name):
             if value is True:
-                flags.append(field.name)
+                flags.append(name)
             else:
-                options[field.name] = str(value)
+                options[name] = str(value)
     if study.shape != (20,) * len(study.shape):
         options["grid"] = "x".join(map(str, study.shape))
     options["bounds"] = ",".join(repr(bound) for pair in study.bounds for bound in pair)

@@ -68,7 +68,7 @@ def standard_error(sampled: NDArray[np.int64]) -> float:
 def summary(means: Floats, errors: Floats) -> tuple[Floats, Floats, Floats, Floats]:
     """Mean over the draws along axis 0, its standard error, and the interval."""
     size = len(means)
-    low, high = np.quantile(means, _INTERVAL, axis=0)
+    low, high = np.quantile(means, _INTERVAL, axis=0, method="weibull")
     if size == 1:
         return means[0], errors[0], low, high
     # The spread of the draws' means already has the simulations' error in it.

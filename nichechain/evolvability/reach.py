@@ -131,7 +131,7 @@ def reach(
         visits.append(visit[:n])
         descendants.append(lineages * passes[:n])
         some.extend(at_least_once(visit[:n], [lineages]))
-    low, high = np.quantile(some, (0.05, 0.95), axis=0)
+    low, high = np.quantile(some, (0.05, 0.95), axis=0, method="weibull")
     return Reach(
         np.mean(visits, axis=0),
         np.mean(some, axis=0),

@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 from nichechain.births.families import elites_of, redrawn
 from nichechain.chain.base_measure import BaseMeasure
 from nichechain.chain.counts import TransitionCounts
-from nichechain.chain.empirical_bayes import design_effect, most_likely
-from nichechain.chain.estimators import with_posterior
+from nichechain.chain.estimators import estimate, refitted, with_posterior
 from nichechain.chain.families import counts_of_families, families_of
 from nichechain.chain.model import NicheChain
 from nichechain.chain.posterior import DirichletPosterior
@@ -103,23 +102,20 @@ def prior_sensitivity(
     check_numbers(factor=factor)
     if not (math.isfinite(factor) and factor > 1):
         raise NichechainError(f"factor is {factor:g}, but must be a number greater than 1")
-    effect = design_effect(counts)
-    strength, weights = most_likely(counts, effect)
-    pooled = float(weights[:2].sum())
-    rest = float(weights[2])
+    fitted = estimate(counts).posterior
+    assert fitted is not None
+    # The others are given as they are: no draw has a base and a strength of its own.
+    given = replace(fitted, prior=None)
+    base, strength = fitted.base, fitted.strength
+    rest = float(base.weights[2])
     priors = {
-        "fitted": (strength, weights),
-        f"strength / {factor:g}": (strength / factor, weights),
-        f"strength x {factor:g}": (strength * factor, weights),
-        "all destination": (strength, np.array([pooled, 0.0, rest])),
-        "all displacement": (strength, np.array([0.0, pooled, rest])),
+        "fitted": fitted,
+        f"strength / {factor:g}": replace(given, strength=strength / factor),
+        f"strength x {factor:g}": replace(given, strength=strength * factor),
+        "all destination": replace(given, base=_only(base, np.array([1.0 - rest, 0.0, rest]))),
+        "all displacement": replace(given, base=_only(base, np.array([0.0, 1.0 - rest, rest]))),
     }
-    values = np.array(
-        [
-            answer_for_niches(_chain(counts, s, mixture, effect), question).value
-            for s, mixture in priors.values()
-        ]
-    )
+    values = np.array([answer_for_niches(_chain(posterior), question).value for posterior in priors.values()])
     return NicheBand("prior sensitivity", values[0], values.min(axis=0), values.max(axis=0), tuple(priors))
 
 
@@ -163,7 +159,8 @@ def bootstrap_elites(
     The elites of each niche are drawn with replacement, each with all its children: Efron and
     Tibshirani (1993), An Introduction to the Bootstrap, and for clusters Field and Welsh (2007),
     Journal of the Royal Statistical Society B 69, 369-390. Births that do not say whose they are
-    count as elites of one child. Strength, mixture and design effect stay as all births gave them.
+    count as elites of one child. Strength and design effect stay as all births gave them, the base
+    measure is fitted again.
 
     Resamples hold fewer different births, which lowers every value: only their spread is used. The
     interval is the value plus the 5 % and 95 % quantiles of the resamples less their median. In a
@@ -176,26 +173,29 @@ def bootstrap_elites(
         raise NichechainError(
             "these births do not say whose children they are, so elites cannot be resampled"
         )
-    effect = design_effect(counts)
-    strength, weights = most_likely(counts, effect)
+    fitted = estimate(counts).posterior
+    assert fitted is not None
 
-    def values(of: TransitionCounts, question: Question) -> Floats:
-        return answer_for_niches(_chain(of, strength, weights, effect), question).value
-
-    value = values(counts, replace(question, draws=DRAWS))
+    value = answer_for_niches(_chain(fitted), replace(question, draws=DRAWS)).value
     families = families_of(counts)
     elite = elites_of(families)
+
+    def again_with(rng: np.random.Generator) -> Floats:
+        others = counts_of_families(redrawn(families, elite, rng), counts)
+        return answer_for_niches(_chain(refitted(fitted, others)), question).value
+
     again = np.array(
-        [
-            values(counts_of_families(redrawn(families, elite, rng), counts), question)
-            for rng in (keyed(seed, Purpose.RESAMPLING, number) for number in range(resamples))
-        ]
+        [again_with(rng) for rng in (keyed(seed, Purpose.RESAMPLING, number) for number in range(resamples))]
     )
-    low, high = value + np.quantile(again, _INTERVAL, axis=0) - np.median(again, axis=0)
+    low, high = value + np.quantile(again, _INTERVAL, axis=0, method="weibull") - np.median(again, axis=0)
     niches = len(counts.niches)
     return NicheBand("bootstrap over elites", value, np.maximum(low, 0.0), np.minimum(high, niches))
 
 
-def _chain(counts: TransitionCounts, strength: float, weights: Floats, effect: Floats) -> NicheChain:
-    posterior = DirichletPosterior(counts, BaseMeasure.pooled(counts, weights), strength, effect)
-    return with_posterior(counts, posterior, f"empirical-bayes, strength {strength:.3g}")
+def _only(base: BaseMeasure, weights: Floats) -> BaseMeasure:
+    """The base measure of its pools alone, with these weights."""
+    return replace(base, weights=weights, near=None)
+
+
+def _chain(posterior: DirichletPosterior) -> NicheChain:
+    return with_posterior(posterior.counts, posterior, f"empirical-bayes, strength {posterior.strength:.3g}")

@@ -17,11 +17,11 @@ from nichechain.landscape.behaviors import (
     population_evolvability,
 )
 from nichechain.landscape.dissimila import QUANTILES, Dissimila, find_dissimila
-from nichechain.landscape.genotypes import LandscapeMeasures, measure, measure_all, niches_of
+from nichechain.landscape.genotypes import GenotypeMeasures, measure, measure_genotypes, niches_of
 from nichechain.landscape.measures import (
     MEASURES,
+    LocalMeasures,
     Measure,
-    Measures,
     find_measure,
     find_measures,
     measure_behaviors,
@@ -34,10 +34,10 @@ __all__ = [
     "QUANTILES",
     "Correlation",
     "Dissimila",
+    "GenotypeMeasures",
     "Landscape",
-    "LandscapeMeasures",
+    "LocalMeasures",
     "Measure",
-    "Measures",
     "dissimila_ratio",
     "evolvability",
     "expected_evolvability",
@@ -50,9 +50,9 @@ __all__ = [
     "hull_volume",
     "local_sensitivity",
     "measure",
-    "measure_all",
     "measure_archive",
     "measure_behaviors",
+    "measure_genotypes",
     "niches_of",
     "one_hot_evolvability",
     "population_evolvability",

@@ -21,7 +21,7 @@ from nichechain.landscape.behaviors import (
     global_sensitivity,
 )
 from nichechain.landscape.dissimila import QUANTILES, Dissimila, find_dissimila
-from nichechain.landscape.measures import MEASURES, Measures, check_sample_size, measure_behaviors
+from nichechain.landscape.measures import MEASURES, LocalMeasures, check_sample_size, measure_behaviors
 from nichechain.landscape.sampling import Kept, operator_digest, sample_families
 from nichechain.niches import Niches
 from nichechain.variation import AdditiveMutation, Mutation, SelfAdaptiveMutation
@@ -115,7 +115,7 @@ class Landscape:
         return int(self.offspring.shape[1])
 
     @cached_property
-    def measures(self) -> Measures:
+    def measures(self) -> LocalMeasures:
         """The local measures, a column each."""
         return measure_behaviors(self.parent, self.offspring, self.niches)
 

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class LandscapeMeasures:
+class GenotypeMeasures:
     """Local measures of one genotype, from a sample of its offspring.
 
     Parameters
@@ -66,15 +66,15 @@ def measure(
     *,
     niches: Niches | None = None,
     epsilon: float = EPSILON,
-) -> LandscapeMeasures:
-    """All local measures of one genotype (P,); the rest is as in :func:`measure_all`."""
+) -> GenotypeMeasures:
+    """All local measures of one genotype (P,); the rest is as in :func:`measure_genotypes`."""
     genotypes = as_floats("genotype", genotype)[None]
-    return measure_all(
+    return measure_genotypes(
         domain, genotypes, mutate, sample_size, seed, executor, niches=niches, epsilon=epsilon
     )[0]
 
 
-def measure_all(
+def measure_genotypes(
     domain: Domain,
     genotypes: ArrayLike,
     mutate: Mutation,
@@ -84,7 +84,7 @@ def measure_all(
     *,
     niches: Niches | None = None,
     epsilon: float = EPSILON,
-) -> tuple[LandscapeMeasures, ...]:
+) -> tuple[GenotypeMeasures, ...]:
     """All local measures of several genotypes, evaluated as one batch.
 
     Parameters
@@ -106,7 +106,7 @@ def measure_all(
 
     Returns
     -------
-    tuple of LandscapeMeasures
+    tuple of GenotypeMeasures
 
     Raises
     ------
@@ -124,7 +124,7 @@ def measure_all(
     offspring = offspring.reshape(count, sample_size, parent.shape[1])
     found = measure_behaviors(parent, offspring, niches, epsilon=epsilon)
     return tuple(
-        LandscapeMeasures(
+        GenotypeMeasures(
             sample_size,
             int(found.failed[g]),
             float(found.local_sensitivity[g]),

@@ -68,7 +68,7 @@ MEASURES = {measure.name: measure for measure in _ALL}
 
 
 @dataclass(frozen=True)
-class Measures:
+class LocalMeasures:
     """Local measures of G genotypes, each from a sample of its offspring.
 
     Parameters
@@ -145,7 +145,7 @@ def find_measures(names: Sequence[str]) -> tuple[Measure, ...]:
 
 def measure_behaviors(
     parent: ArrayLike, offspring: ArrayLike, niches: Niches | None = None, *, epsilon: float = EPSILON
-) -> Measures:
+) -> LocalMeasures:
     """All local measures of genotypes, from behaviors alone.
 
     Parameters
@@ -160,7 +160,7 @@ def measure_behaviors(
 
     Returns
     -------
-    Measures
+    LocalMeasures
         A genotype's do not depend on the others.
 
     Raises
@@ -191,7 +191,7 @@ def measure_behaviors(
         state = np.full(alive.shape, NONE, np.int64)
         state[alive] = niches.of(born[alive])
         covered = one_hot_evolvability(state, len(niches))
-    return Measures(
+    return LocalMeasures(
         sample_size=size,
         failed=(~alive).sum(axis=1),
         local_sensitivity=farthest,

@@ -1,18 +1,20 @@
 """Figures. Every ``plot_`` function draws on a matplotlib Axes and returns it."""
 
-from nichechain.plots.calibration import plot_calibration, plot_reached
 from nichechain.plots.classes import plot_classes, plot_transitions_by_class
 from nichechain.plots.explorer import write_explorer
+from nichechain.plots.graphs import plot_reachability, plot_wormholes
 from nichechain.plots.growth import plot_generations, plot_lineages
-from nichechain.plots.maps import plot_elites, plot_evolvability, plot_visits
+from nichechain.plots.maps import plot_elites, plot_evolvability, plot_reach, plot_uncertainty, plot_visits
 from nichechain.plots.matrix import plot_transitions
-from nichechain.plots.reach import plot_reach
-from nichechain.plots.reachability import plot_reachability
-from nichechain.plots.stability import plot_stability
-from nichechain.plots.sweep import plot_filling, plot_scores, plot_surprise
-from nichechain.plots.uncertainty import plot_uncertainty
+from nichechain.plots.validation import (
+    plot_calibration,
+    plot_filling,
+    plot_reached,
+    plot_scores,
+    plot_stability,
+    plot_surprise,
+)
 from nichechain.plots.walks import draw_study, plot_runs, plot_walks
-from nichechain.plots.wormholes import plot_wormholes
 
 __all__ = [
     "draw_study",

@@ -133,7 +133,7 @@ def _lines(
     for number in range(len(niches)):
         here = values[:, number]
         mean = here.mean(axis=0)
-        low, high = np.quantile(here, (0.05, 0.95), axis=0)
+        low, high = np.quantile(here, (0.05, 0.95), axis=0, method="weibull")
         saturated = np.median(here / endless[:, number], axis=0) > SATURATED
         hollows |= bool(saturated.any())
         color, marker = _COLORS[number], _MARKERS[number]

@@ -1,4 +1,4 @@
-"""Heat maps over behavior space: elites, visits, evolvability."""
+"""Maps of niches over behavior space: elites, visits, evolvability, its uncertainty, and reach."""
 
 from __future__ import annotations
 
@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nichechain.core.checks import check_whole
-from nichechain.plots.cells import fill, hatch
-from nichechain.plots.style import EMPTY, behavior_axes, colorbar, key, on_map
+from nichechain.core.errors import NichechainError
+from nichechain.plots.cells import fill, frame, hatch
+from nichechain.plots.style import EMPTY, INK, behavior_axes, colorbar, key, on_map
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -18,6 +19,8 @@ if TYPE_CHECKING:
 
     from nichechain.archive.archive import Archive
     from nichechain.evolvability import NicheEvolvability
+    from nichechain.evolvability.reach import Reach
+    from nichechain.niches import Niche
 
 
 def plot_elites(archive: Archive, ax: Axes) -> Axes:
@@ -113,3 +116,81 @@ def _map(
     behavior_axes(ax, archive)
     ax.set_facecolor(EMPTY)
     return fill(ax, archive.niches, values, colors, norm)
+
+
+def plot_uncertainty(archive: Archive, scores: NicheEvolvability, ax: Axes) -> Axes:
+    """Width of the 90 % interval of every niche that was a parent; stands beside the values.
+
+    Parameters
+    ----------
+    archive : Archive
+    scores : NicheEvolvability
+        As for :func:`nichechain.plots.plot_evolvability`.
+    ax : matplotlib.axes.Axes
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+
+    Raises
+    ------
+    NichechainError
+        If T is given, so that there is no interval, or behavior does not have two axes.
+    """
+    width = scores.high - scores.low
+    if not width.any():
+        raise NichechainError(f"T is given by {scores.estimator}, which leaves no interval to draw")
+    births = archive.counts.births[: len(archive.niches)]
+    behavior_axes(ax, archive)
+    ax.set_facecolor(EMPTY)
+    shown = np.where(births > 0, width, np.nan)
+    mesh = fill(ax, archive.niches, shown, "cividis")
+    colorbar(ax, mesh, "width of the 90 % interval (niches)")
+    ax.set_title(f"Uncertainty: {np.median(width[births > 0]):.1f} niches in the middle")
+    key(ax, note=f"{scores.estimator}; grey: never a parent")
+    return ax
+
+
+def plot_reach(archive: Archive, reach: Reach, ax: Axes, *, niche: Niche | None = None) -> Axes:
+    """Probability that at least one of U lineages visits each niche.
+
+    Colours follow the square root of the probability, so that rare niches are seen.
+
+    Parameters
+    ----------
+    archive : Archive
+    reach : Reach
+        From :func:`nichechain.evolvability.reach.reach`.
+    ax : matplotlib.axes.Axes
+    niche : int or tuple of int, optional
+        Where the root stands, to frame it.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+
+    Raises
+    ------
+    NichechainError
+        If there is no such niche, or behavior does not have two axes.
+    """
+    from matplotlib.colors import PowerNorm
+    from matplotlib.patches import Patch
+
+    behavior_axes(ax, archive)
+    ax.set_facecolor(EMPTY)
+    mesh = fill(ax, archive.niches, reach.at_least_one, "Blues", PowerNorm(0.5, 0.0, 1.0))
+    lineages = "the lineage" if reach.lineages == 1 else f"one of {reach.lineages} lineages"
+    colorbar(ax, mesh, f"probability that {lineages} visits")
+    handles = []
+    whose = ""
+    if niche is not None:
+        state = archive.niches.flat(niche)
+        frame(ax, archive.niches, state)
+        whose = f" from niche {archive.niches.label(state)}"
+        handles.append(Patch(fill=False, edgecolor=INK, linewidth=2.0, label="the root's niche"))
+    generations = "1 generation" if reach.l == 1 else f"{reach.l} generations"
+    ax.set_title(f"Reach{whose} in {generations}: {reach.evolvability:.1f} niches")
+    births = "" if reach.births is None else f"; {reach.births} births behind the row"
+    key(ax, *handles, note=f"{reach.estimator}; convention: {reach.convention}{births}")
+    return ax

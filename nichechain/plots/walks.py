@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-MEASURES: Mapping[str, str] = {
+DRAWN: Mapping[str, str] = {
     "expected_evolvability": "expected evolvability η*",
     "evolvability": "evolvability η",
     "coverage": "coverage d/n of the offspring",
@@ -86,7 +86,7 @@ def plot_walks(
         Of :func:`nichechain.studies.read_records`.
     ax : matplotlib.axes.Axes
     measure : str
-        One of :data:`MEASURES`.
+        One of :data:`DRAWN`.
     conditions : sequence of str, optional
         Which, in the order of the legend; by default all, as they come.
     ordered : bool
@@ -265,7 +265,7 @@ def _draw_starts(
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(15.0, 4.6), layout="constrained")
-    for ax, measure in zip(figure.subplots(1, 3), MEASURES, strict=True):
+    for ax, measure in zip(figure.subplots(1, 3), DRAWN, strict=True):
         plot_runs(records, ax, step=0, measure=measure, conditions=conditions, ordered=ordered, unit=unit)
     figure.suptitle(f"{title}: every run at step 0, median and quartiles")
     return figure
@@ -277,7 +277,7 @@ def _columns(labels: Sequence[str]) -> int:
 
 
 def _labels(records: pd.DataFrame, measure: str, conditions: Sequence[str] | None) -> list[str]:
-    check_choice("measure", measure, MEASURES)
+    check_choice("measure", measure, DRAWN)
     there = list(dict.fromkeys(records["condition"]))
     if not there:
         raise NichechainError("there are no finished walks to draw")
@@ -301,7 +301,7 @@ def _spread(values: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _axis(measure: str, unit: str) -> str:
-    return f"{MEASURES[measure]} ({unit})" if unit and measure != "coverage" else MEASURES[measure]
+    return f"{DRAWN[measure]} ({unit})" if unit and measure != "coverage" else DRAWN[measure]
 
 
 def _finish(ax: Axes) -> None:

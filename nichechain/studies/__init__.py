@@ -2,17 +2,31 @@
 
 from __future__ import annotations
 
-from nichechain.studies.conditions import Condition, condition_seed, pressure_of, selection_of
-from nichechain.studies.initialisation import initialise
-from nichechain.studies.running import is_study, read_births, read_records, read_study, run
-from nichechain.studies.study import (
-    LEVELS,
-    METRICS,
-    VARIATIONS,
-    Study,
-    metric_conditions,
-    pressure_conditions,
-    variations,
+from typing import TYPE_CHECKING
+
+from nichechain.core.lazy import lazily
+
+if TYPE_CHECKING:
+    from nichechain.studies.conditions import Condition, condition_seed, pressure_of, selection_of
+    from nichechain.studies.initialisation import initialise
+    from nichechain.studies.running import is_study, read_births, read_records, read_study, run
+    from nichechain.studies.study import (
+        LEVELS,
+        METRICS,
+        VARIATIONS,
+        Study,
+        metric_conditions,
+        pressure_conditions,
+        variations,
+    )
+
+# The options of walks are told without what walking needs.
+__getattr__, __dir__ = lazily(
+    __name__,
+    conditions="Condition condition_seed pressure_of selection_of",
+    initialisation="initialise",
+    running="is_study read_births read_records read_study run",
+    study="LEVELS METRICS VARIATIONS Study metric_conditions pressure_conditions variations",
 )
 
 __all__ = [

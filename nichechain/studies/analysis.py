@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 MAIN = "expected_evolvability"
 """The measure that the paper calls evolvability in its results."""
 
-MEASURES = (MAIN, "evolvability", "coverage")
+TESTED = (MAIN, "evolvability", "coverage")
 
 Asking = Literal["trend", "groups", "change"]
 
@@ -169,7 +169,7 @@ def analyse(
     asked = [ask.groups(0, MAIN, tables.labels)]
     for step in steps:
         asked += [ask.change(label, step) for label in tables.labels if step > 0]
-        for measure in MEASURES:
+        for measure in TESTED:
             if study.kind == "pressure" or varied(study) is not None:
                 asked.append(ask.trend(step, measure))
             if study.kind != "pressure" and step > 0:
@@ -200,7 +200,7 @@ def varied(study: Study) -> str | None:
     if study.kind != "sensitivity":
         return None
     settings = [asdict(condition) for condition in study.conditions]
-    names = [field.name for field in fields(Condition) if field.name != "label"]
+    names = Condition.names()[1:]
     differing = [name for name in names if len({setting[name] for setting in settings}) > 1]
     if len(differing) != 1 or not all(isinstance(s[differing[0]], int | float) for s in settings):
         return None
@@ -234,7 +234,7 @@ class _Tables:
             (label, measure): rows.pivot(index="run", columns="step", values=measure)
             for label in self.labels
             for rows in [frame[frame["condition"] == label]]
-            for measure in MEASURES
+            for measure in TESTED
         }
 
     def at(self, label: str, measure: str, step: int) -> pd.Series:

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import re
 import zlib
-from dataclasses import dataclass
-from typing import Literal, get_args
+from dataclasses import dataclass, fields
+from typing import get_args
 
 from nichechain import variation
 from nichechain.core.checks import check_choice
 from nichechain.core.errors import NichechainError
 from nichechain.core.randomness import Purpose, keyed
 from nichechain.studies.initialisation import check_scheme
+from nichechain.studies.settings import MetricName, Mode, WalkSettings
 from nichechain.variation import Mutation
 from nichechain.variation.additive import parse_step_bound
 from nichechain.walks import (
@@ -25,13 +26,10 @@ from nichechain.walks import (
 )
 from nichechain.walks.diversity import ArchiveRule, Metric
 
-MetricName = Literal["knn", "knn-no-archive", "parent", "ancestors", "kde"]
-Mode = Literal["factor", "length"]
-
 
 @dataclass(frozen=True)
-class Condition:
-    """One kind of walk; every default is the paper's ("Hyperparameters").
+class Condition(WalkSettings):
+    """One kind of walk.
 
     Parameters
     ----------
@@ -42,31 +40,8 @@ class Condition:
         ``0.25`` (the best quarter), or ``random``.
     metric : {"knn", "knn-no-archive", "parent", "ancestors", "kde"}
         Diversity G.
-    offspring : int
-        Children of a state in each step.
-    mutation : str
-        Mutation operator.
-    scale : float
-        Its scale.
-    step_bound : str, optional
-        Bound of a mutation's step, such as ``per-coordinate:2`` or ``rescaled:50``, that makes N(θ)
-        a bounded set, see :class:`nichechain.variation.Bound`.
-    k : int
-        Neighbours of the kNN metrics.
-    bandwidth : float
-        Smoothing parameter of the KDE metric.
-    mode : {"factor", "length"}
-        What that parameter multiplies, see :class:`nichechain.walks.diversity.KernelDensity`.
-    decay : float
-        Discount g of the KDE metric by age, γ = g^age.
-    archive_limit : int
-        Behaviors that the novelty archive holds at most.
-    archive_scope : {"walk", "configuration"}
-        Whether each walk has a novelty archive of its own or all of the condition share one.
-    other_niche : bool
-        The niche variant: only a child in another niche than its parent may follow.
-    initialisation : str
-        How the first genotype is made, see :mod:`nichechain.studies.initialisation`.
+    offspring, mutation, ...
+        As in :class:`WalkSettings`, by name.
 
     Raises
     ------
@@ -77,18 +52,11 @@ class Condition:
     label: str
     level: str = "selective"
     metric: MetricName = "knn"
-    offspring: int = 30
-    mutation: str = "cauchy"
-    scale: float = 1.0
-    k: int = 15
-    bandwidth: float = 0.5
-    mode: Mode = "factor"
-    decay: float = 1.0
-    archive_limit: int = 1200
-    archive_scope: Literal["walk", "configuration"] = "walk"
-    step_bound: str | None = None
-    other_niche: bool = False
-    initialisation: str = "domain"
+
+    @classmethod
+    def names(cls) -> tuple[str, ...]:
+        """Of all values: what tells conditions apart first, then what they have in common."""
+        return ("label", "level", "metric", *(field.name for field in fields(WalkSettings)))
 
     def __post_init__(self) -> None:
         check_choice("metric", self.metric, get_args(MetricName))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import fields
 
 from nichechain.core.intervals import LEVEL
 from nichechain.landscape import QUANTILES
@@ -118,12 +117,12 @@ def _reservations(analysis: Analysis) -> Iterator[str]:
         )
     usual = Condition(label="x")
     compared = {"label", "level" if study.kind == "pressure" else "metric"}
-    for field in fields(Condition):
-        values = {getattr(condition, field.name) for condition in study.conditions}
-        ours = getattr(usual, field.name)
-        if field.name not in compared and values != {ours}:
+    for name in Condition.names():
+        values = {getattr(condition, name) for condition in study.conditions}
+        ours = getattr(usual, name)
+        if name not in compared and values != {ours}:
             listed = ", ".join(sorted(map(str, values)))
-            yield f"Setting {field.name} is {listed} here, and {ours} by default, our reading of the paper."
+            yield f"Setting {name} is {listed} here, and {ours} by default, our reading of the paper."
     if study.kind == "pressure":
         yield (
             "The paper does not say which diversity metric its pressure experiment used; its word is novelty."
@@ -311,9 +310,9 @@ def _made_by(analysis: Analysis, command: str, versions: dict[str, str]) -> Iter
             "Versions: " + ", ".join(f"{name} {version}" for name, version in versions.items()) + ".",
         )
     )
-    names = [field.name for field in fields(Condition)]
+    names = Condition.names()
     yield Table(
         "Settings of each condition.",
-        tuple(names),
+        names,
         tuple(tuple(str(getattr(condition, name)) for name in names) for condition in study.conditions),
     )

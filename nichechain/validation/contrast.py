@@ -13,10 +13,8 @@ from scipy import stats
 
 from nichechain.births.joins import across_runs
 from nichechain.births.table import NONE, check_columns
-from nichechain.chain.base_measure import BaseMeasure
 from nichechain.chain.counts import TransitionCounts
-from nichechain.chain.empirical_bayes import design_effect, most_likely
-from nichechain.chain.posterior import DirichletPosterior
+from nichechain.chain.estimators import estimate, refitted
 from nichechain.core.checks import check_at_least
 from nichechain.core.errors import NichechainError
 from nichechain.core.randomness import Purpose, keyed
@@ -136,8 +134,8 @@ def contrast(
     -----
     Where an archive has several runs, whole runs are drawn with replacement; where it has one,
     its elites are, with all their children: then the interval tells what other elites of this
-    run would have changed, not what another run would. The prior keeps the strength and mixture
-    that all births gave. Resamples hold fewer different births than a real sample, which lowers
+    run would have changed, not what another run would. The prior keeps the strength that
+    all births gave. Resamples hold fewer different births than a real sample, which lowers
     every figure, so only their spread is used: the interval is the difference ± its standard error
     times Student's quantile, and for few runs r the spread is corrected by √(r/(r − 1)).
     """
@@ -155,12 +153,11 @@ def contrast(
     size = min(int(counts.visits.sum()) for counts in whole)
     values, spreads, freedom = [], [], []
     for number, (side, counts) in enumerate(zip(sides, whole, strict=True)):
-        effect = design_effect(counts)
-        strength, weights = most_likely(counts, effect)
+        fitted = estimate(counts).posterior
+        assert fitted is not None
 
         def figures(counts: TransitionCounts, draws: int, rng: np.random.Generator) -> Floats:
-            base = BaseMeasure.pooled(counts, weights)  # noqa: B023  # called in this round only
-            posterior = DirichletPosterior(counts, base, strength, effect)  # noqa: B023
+            posterior = refitted(fitted, counts)  # noqa: B023  # called in this round only
             found = np.zeros(2)
             for _ in range(draws):
                 T = posterior.draw(rng)

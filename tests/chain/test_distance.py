@@ -7,7 +7,6 @@ from nichechain import NicheChain, TransitionCounts, estimate, niche_evolvabilit
 from nichechain.chain import distance as distances
 from nichechain.chain.base_measure import BaseMeasure
 from nichechain.chain.distance import DistanceDisplacement
-from nichechain.chain.empirical_bayes import _without_own
 from nichechain.chain.posterior import DirichletPosterior
 from nichechain.chain.structure.wormholes import wormholes
 from nichechain.niches import CVTNiches
@@ -111,19 +110,6 @@ def test_draws_follow_the_rows():
     rows = base.rows(np.arange(states))
     share = np.array([np.bincount(drawn[parents == i], minlength=states) for i in range(states)]) / size
     assert (np.abs(share - rows) <= 4.5 * np.sqrt(rows * (1 - rows) / size) + 1e-12).all()
-
-
-@pytest.mark.parametrize("name", ["line", "plane"])
-def test_without_a_parent_weights_are_those_of_the_others(name):
-    counts = _counts(name, "clip")
-    n = len(counts.niches)
-    parent, child = np.divmod(np.arange(n * n), n)
-    _, displaced, _ = _without_own(counts, parent, child)
-    expected = []
-    for i in range(n):
-        weight, _ = _naive_weights(counts, leave_out=i)
-        expected.append(weight[i] / weight[i].sum())
-    np.testing.assert_allclose(displaced.reshape(n, n), np.maximum(expected, 1e-12), rtol=1e-9)
 
 
 def test_a_parent_at_the_edge_has_its_children_inside():

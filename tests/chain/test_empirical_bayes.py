@@ -11,12 +11,12 @@ from nichechain.chain.counts import TransitionCounts
 from nichechain.chain.displacement import GridDisplacement
 from nichechain.chain.empirical_bayes import (
     _left_out,
-    _without_own,
     design_effect,
-    most_likely,
     sibling_correlation,
+    strength_of,
 )
 from nichechain.chain.estimators import estimate
+from nichechain.chain.prior import fit_prior
 from nichechain.niches import GridNiches
 
 ROW = GridNiches((4,), ((0.0, 4.0),))
@@ -51,7 +51,8 @@ def _known_base(weights, shape=(10, 10)):
 @pytest.mark.parametrize("weights", [(0.9, 0.05, 0.05), (0.05, 0.9, 0.05), (0.45, 0.45, 0.1)])
 def test_strength_and_mixture_are_learned_from_births(strength, weights):
     counts, _ = _simulate(_known_base(weights), strength, 100, seed=4)
-    fitted, mixture = most_likely(counts, np.ones(counts.niches.states))
+    prior = fit_prior(counts)
+    fitted, mixture = prior.strength, prior.base.weights
     # A hundred rows of a hundred births pin s down to a few per cent, if B were known; it is not.
     assert fitted == pytest.approx(strength, rel=0.35)
     assert mixture.sum() == pytest.approx(1.0)
@@ -70,9 +71,9 @@ def test_the_learned_strength_is_near_the_most_likely_one_for_the_true_base():
         sum(stats.dirichlet_multinomial.logpmf(row, s * b, 60) for row, b in zip(table, rows, strict=True))
         for s in strengths
     ]
-    assert most_likely(counts, np.ones(counts.niches.states))[0] == pytest.approx(
-        strengths[np.argmax(likelihood)], rel=0.3
-    )
+    best = strengths[np.argmax(likelihood)]
+    assert fit_prior(counts).strength == pytest.approx(best, rel=0.3)
+    assert strength_of(counts, lambda i, j: rows[i, j])[0] == pytest.approx(best, rel=0.3)
 
 
 def test_the_estimate_is_nearly_as_near_to_the_truth_as_can_be():
@@ -85,24 +86,6 @@ def test_the_estimate_is_nearly_as_near_to_the_truth_as_can_be():
     errors = [((matrix - truth) ** 2).sum(axis=1).mean() for matrix in estimates]
     assert errors[0] < errors[1] < 1.05 * errors[0]
     assert errors[2] > 1.3 * errors[0]
-
-
-def test_a_row_does_not_vouch_for_itself():
-    # What the pool says of a row's births, with that row's births out of the pool: the base measure
-    # of all other rows' births.
-    niches = GridNiches((5, 4), ((0.0, 1.0), (0.0, 1.0)))
-    rng = np.random.default_rng(6)
-    parent = rng.integers(21, size=150)
-    child = np.where(rng.random(150) < 0.6, np.minimum(parent + 1, 20), rng.integers(21, size=150))
-    counts = TransitionCounts.from_pairs(parent, child, niches)
-    weights = np.array([0.5, 0.4, 0.1])
-    entries = counts.matrix.tocoo()
-    i, j = (axis.astype(np.int64) for axis in entries.coords)
-    found = _without_own(counts, i, j)
-    for column, (row, state) in enumerate(zip(i, j, strict=True)):
-        others = TransitionCounts.from_pairs(parent[parent != row], child[parent != row], niches)
-        expected = BaseMeasure.pooled(others, weights).components(np.array([row]), np.array([state]))[:, 0]
-        np.testing.assert_allclose(found[:, column], np.maximum(expected, 1e-12), rtol=1e-9, atol=1e-11)
 
 
 def _families(concentration, elites, children, seed):
@@ -183,8 +166,8 @@ def test_likeness_of_siblings_is_not_taken_for_a_difference_between_niches():
     child = np.repeat(rng.integers(20, size=120), 8)
     counts = TransitionCounts.from_births(elite % 20, child, niches, elite=elite)
     assert sibling_correlation(counts) == pytest.approx(1.0, abs=0.02)
-    with_families, _ = most_likely(counts, design_effect(counts))
-    without, _ = most_likely(TransitionCounts.from_pairs(elite % 20, child, niches), np.ones(21))
+    with_families = fit_prior(counts).strength
+    without = fit_prior(TransitionCounts.from_pairs(elite % 20, child, niches)).strength
     assert with_families > 50 * without
 
 

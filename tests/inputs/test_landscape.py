@@ -103,7 +103,7 @@ CALLS = (
         },
     ),
     Call(
-        "landscape.measure_all",
+        "landscape.measure_genotypes",
         lambda w: {"domain": w.arm, "genotypes": w.genotypes, "mutate": w.mutate, "sample_size": 2},
         {
             "genotypes": (np.zeros(3), np.zeros((2, 3)), np.full((1, 10), np.nan), "three", _ROWS),

@@ -36,11 +36,11 @@ def test_measures_of_a_genotype_are_those_of_its_children():
 def test_measures_depend_neither_on_company_nor_on_workers():
     domain, mutate = domains.make("arm"), variation.cauchy()
     genotypes = domain.sample(5, seed=0)
-    together = landscape.measure_all(domain, genotypes, mutate, 8, 1)
+    together = landscape.measure_genotypes(domain, genotypes, mutate, 8, 1)
     assert together[3] == landscape.measure(domain, genotypes[3], mutate, 8, 1)
     domain.chunk = 7
     with Threads(2) as threads:
-        assert landscape.measure_all(domain, genotypes, mutate, 8, 1, threads) == together
+        assert landscape.measure_genotypes(domain, genotypes, mutate, 8, 1, threads) == together
 
 
 @settings(max_examples=10)

@@ -12,10 +12,9 @@ from nichechain.chain.structure.wormholes import wormholes
 from nichechain.core.errors import NichechainError
 from nichechain.evolvability.reach import reach
 from nichechain.plots.classes import plot_classes, plot_transitions_by_class
-from nichechain.plots.reach import plot_reach
+from nichechain.plots.graphs import plot_wormholes
+from nichechain.plots.maps import plot_reach, plot_uncertainty
 from nichechain.plots.style import LONG_JUMP
-from nichechain.plots.uncertainty import plot_uncertainty
-from nichechain.plots.wormholes import plot_wormholes
 
 
 @pytest.fixture(scope="module")

@@ -1,7 +1,7 @@
 import numpy as np
 from matplotlib.figure import Figure
 
-from nichechain.plots.stability import plot_stability
+from nichechain.plots.validation import plot_stability
 from nichechain.validation.stability import ENOUGH, RankStability
 
 

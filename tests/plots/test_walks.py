@@ -6,7 +6,7 @@ from matplotlib.figure import Figure
 from scipy import stats
 
 from nichechain.core.errors import NichechainError
-from nichechain.plots.walks import MEASURES, draw_study, line_styles, plot_runs, plot_walks
+from nichechain.plots.walks import DRAWN, draw_study, line_styles, plot_runs, plot_walks
 
 LABELS = ("selective", "0.5", "random")
 
@@ -15,7 +15,7 @@ LABELS = ("selective", "0.5", "random")
 def records():
     rng = np.random.default_rng(0)
     condition, run, step = (a.ravel() for a in np.meshgrid(LABELS, range(6), range(12), indexing="ij"))
-    columns = {measure: rng.uniform(0.2, 1, step.size) for measure in MEASURES}
+    columns = {measure: rng.uniform(0.2, 1, step.size) for measure in DRAWN}
     return pd.DataFrame({"condition": condition, "run": run, "step": step, **columns})
 
 
@@ -34,7 +34,7 @@ def lightness(color):
     return float(np.dot(to_rgb(color), (0.2126, 0.7152, 0.0722)))
 
 
-@pytest.mark.parametrize("measure", MEASURES)
+@pytest.mark.parametrize("measure", DRAWN)
 def test_lines_are_means_and_bands_are_t_intervals(records, ax, measure):
     assert plot_walks(records, ax, measure=measure, unit="m") is ax
     assert [line.get_label() for line in ax.lines] == [f"{label} (6 runs)" for label in LABELS]

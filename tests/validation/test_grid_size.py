@@ -14,7 +14,7 @@ from nichechain.cli import sweep as command
 from nichechain.cli.sweep import parse_sizes
 from nichechain.core.errors import NichechainError
 from nichechain.niches import GridNiches
-from nichechain.plots.sweep import plot_filling, plot_scores, plot_surprise
+from nichechain.plots.validation import plot_filling, plot_scores, plot_surprise
 from nichechain.validation.grid_size import (
     GridSize,
     Sweep,

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 import nichechain as nc
 from nichechain.cli import main
 from nichechain.core.errors import NichechainError
-from nichechain.plots.calibration import plot_calibration, plot_reached
+from nichechain.plots.validation import plot_calibration, plot_reached
 from nichechain.validation import ValidationConfig, validate
 
 CONFIG = ValidationConfig(elites=8, lineages=6, l=3, offspring=10, permutations=19, seed=2)

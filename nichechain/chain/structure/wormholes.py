@@ -84,7 +84,7 @@ def wormholes(
         )
     posterior, counts = chain.posterior, chain.counts
     parent, child, count = _between_niches(counts)
-    displacement, destination = _expected(counts, posterior.base, parent, child, count)
+    displacement, destination = _expected(counts, parent, child, count)
     prior = posterior.strength * posterior.base.probability(parent, child)
     mass = count / posterior.design_effect[parent] + prior
     rest = np.asarray(posterior.weights.sum(axis=1)).ravel()[parent] + posterior.strength - mass
@@ -126,11 +126,10 @@ def _between_niches(counts: TransitionCounts) -> tuple[Ints, Ints, Ints]:
     return parent[kept], child[kept], entries.data[kept].astype(np.int64)
 
 
-def _expected(
-    counts: TransitionCounts, base: BaseMeasure, parent: Ints, child: Ints, count: Ints
-) -> tuple[Floats, Floats]:
+def _expected(counts: TransitionCounts, parent: Ints, child: Ints, count: Ints) -> tuple[Floats, Floats]:
     """Probability of each pair by pooled displacement and by destination, without its own births."""
     n = len(counts.niches)
+    base = BaseMeasure.pooled(counts, np.ones(3) / 3)
     destination, displacement, _ = base.components(parent, child)
     # Births that the pools are made of, with the imaginary ones that BaseMeasure adds.
     total = float(counts.matrix.sum()) + 1.0

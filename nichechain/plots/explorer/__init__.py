@@ -232,7 +232,7 @@ def _intervals(chain: NicheChain, question: Question) -> dict[str, Any]:
         coverage_by_generation(matrix, roots, LONGEST, sizes, chain.n_niches).astype(np.float32)
         for matrix in question.transitions(chain)
     ]
-    summary = np.stack([np.mean(drawn, axis=0), *np.quantile(drawn, (0.05, 0.95), axis=0)])
+    summary = np.stack([np.mean(drawn, axis=0), *np.quantile(drawn, (0.05, 0.95), axis=0, method="weibull")])
     return {
         "l": question.l,
         "lineages": question.lineages,

@@ -113,7 +113,7 @@ def broken() -> OSError:
     return OSError(errno.EIO, os.strerror(errno.EIO))
 
 
-SAID = re.compile(r".* cannot be written( to: |: .*; the last commit, of 450 births, is whole: --resume).*")
+SAID = re.compile(r".* cannot be written( to: |: .*; the last commit, of 450 births, is whole: another).*")
 
 
 def attempt(folder: Path, config: BuildConfig) -> str | None:
