@@ -26,7 +26,7 @@ from numpy.typing import ArrayLike, NDArray
 import nichechain as nc
 from nichechain import domains, execution, variation
 from nichechain.archive import read, write
-from nichechain.archive.build import build
+from nichechain.archive.building import build
 from nichechain.core.randomness import Purpose, keyed
 from nichechain.domains import Evaluation, FetchPickAndPlace, PlanarArm
 from nichechain.domains.base import Domain

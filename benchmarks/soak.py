@@ -21,7 +21,7 @@ from pathlib import Path
 import numpy as np
 
 from nichechain.archive import read, write
-from nichechain.archive.build import BuildProgress, build
+from nichechain.archive.building import BuildProgress, build
 from nichechain.domains import PlanarArm
 from nichechain.execution import Threads
 from nichechain.niches import parse_shape

@@ -34,7 +34,8 @@ def score(estimator: Estimator, truth: Truth, births: int, share: float, seed: i
     births : int
         Budget of the search that the estimator is given: the first births of the archive. Roots
         whose niche nobody was born in by then are left out, and so is the ``elite`` start of roots
-        that were born later.
+        that were born later. Roots are always elites of the whole archive, so a smaller budget is
+        judged by elites older than its own: what drifts over a search shows as well.
     share : float
         Of these births that were spent on lineages without selection.
 

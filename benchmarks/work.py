@@ -27,7 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 from rollout import envpool_task
 
-from nichechain.archive.build import build
+from nichechain.archive.building import build
 from nichechain.domains.base import Domain, Evaluation
 from nichechain.domains.fetch import FetchPickAndPlace
 from nichechain.execution import Threads

@@ -10,9 +10,8 @@ from matplotlib.figure import Figure
 
 import nichechain as nc
 from nichechain import plots
-from nichechain.chain.structure.passage import mean_first_passage_times
-from nichechain.chain.structure.wormholes import wormholes
-from nichechain.evolvability.reach import reach
+from nichechain.chain.structure import mean_first_passage_times, wormholes
+from nichechain.evolvability import reach
 
 archive = nc.load("fetch-pick-and-place")
 chain = archive.chain()

@@ -16,7 +16,7 @@ from ray.cluster_utils import Cluster
 
 import nichechain as nc
 from nichechain import domains, execution
-from nichechain.archive.build import BuildProgress
+from nichechain.archive import BuildProgress
 
 domain = domains.make("fetch")
 config = nc.BuildConfig("fetch", (20, 20), domain.bounds, evaluations=400, seed=0)

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 
 from nichechain import walks
 from nichechain.domains import CosinusMap
-from nichechain.variation.polynomial import PolynomialMutation
+from nichechain.variation import PolynomialMutation
 from nichechain.walks.diversity import ArchiveRule, KNearest
 
 RUNS, GENERATIONS, EVERY, OFFSPRING, BINS = 20, 300, 20, 300, 50

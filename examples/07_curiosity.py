@@ -12,7 +12,7 @@ from scipy import stats
 
 import nichechain as nc
 from nichechain import plots
-from nichechain.search.parents import curiosity
+from nichechain.search import curiosity
 
 L, LINEAGES, MIN_BIRTHS = 5, 100, 20
 

@@ -17,7 +17,7 @@ from ribs.visualize import grid_archive_heatmap
 
 import nichechain as nc
 from nichechain import plots
-from nichechain.archive.imported import Axes
+from nichechain.archive import Axes
 from nichechain.pyribs import from_ribs, record  # +
 
 JOINTS = 12

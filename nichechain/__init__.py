@@ -6,18 +6,16 @@ niches; the chain scores niches and genotypes by l-evolvability.
 
 from __future__ import annotations
 
-import importlib
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from nichechain._version import __version__ as __version__
+from nichechain.core.lazy import lazily
 
 if TYPE_CHECKING:
     from nichechain import domains, landscape, studies, variation, walks
-    from nichechain.archive.archive import Archive, Elite, load
-    from nichechain.archive.build import build
-    from nichechain.archive.calibrate import calibrate
+    from nichechain.archive import Archive, Elite, build, calibrate, load
     from nichechain.chain import NicheChain, TransitionCounts, estimate
-    from nichechain.core.errors import ArchiveError, NichechainError
+    from nichechain.core import ArchiveError, NichechainError
     from nichechain.evolvability import (
         Evolvability,
         NicheBand,
@@ -31,45 +29,9 @@ if TYPE_CHECKING:
     from nichechain.execution import Threads
     from nichechain.niches import CVTNiches, GridNiches, Niches, one_hot
     from nichechain.pyribs import from_ribs
-    from nichechain.search.config import BuildConfig
-    from nichechain.search.parents import curiosity
+    from nichechain.search import BuildConfig, curiosity
     from nichechain.verification import Verification, verify
     from nichechain.walks import walk
-
-# Names are imported when they are first used: NumPy, SciPy and pandas take half a second.
-_HOMES = {
-    "Archive": "archive.archive",
-    "ArchiveError": "core.errors",
-    "BuildConfig": "search.config",
-    "CVTNiches": "niches",
-    "Elite": "archive.archive",
-    "Evolvability": "evolvability",
-    "GridNiches": "niches",
-    "NicheBand": "evolvability",
-    "NicheChain": "chain",
-    "NicheEvolvability": "evolvability",
-    "NichechainError": "core.errors",
-    "Niches": "niches",
-    "Threads": "execution",
-    "TransitionCounts": "chain",
-    "Verification": "verification",
-    "bootstrap_elites": "evolvability",
-    "build": "archive.build",
-    "calibrate": "archive.calibrate",
-    "curiosity": "search.parents",
-    "estimate": "chain",
-    "from_ribs": "pyribs",
-    "genotype_evolvability": "evolvability",
-    "l_evolvability": "evolvability",
-    "load": "archive.archive",
-    "niche_evolvability": "evolvability",
-    "one_hot": "niches",
-    "prior_sensitivity": "evolvability",
-    "verify": "verification",
-    "walk": "walks",
-}
-
-_PACKAGES = ("domains", "landscape", "studies", "variation", "walks")
 
 __all__ = [
     "Archive",
@@ -108,14 +70,22 @@ __all__ = [
     "walks",
 ]
 
-
-def __getattr__(name: str) -> Any:
-    if name in _PACKAGES:
-        return importlib.import_module(f"nichechain.{name}")
-    if name in _HOMES:
-        return getattr(importlib.import_module(f"nichechain.{_HOMES[name]}"), name)
-    raise AttributeError(f"module 'nichechain' has no attribute {name!r}")
-
-
-def __dir__() -> list[str]:
-    return __all__
+# NumPy, SciPy and pandas take half a second.
+__getattr__, __dir__ = lazily(
+    __name__,
+    archive="Archive Elite build calibrate load",
+    chain="NicheChain TransitionCounts estimate",
+    core="ArchiveError NichechainError",
+    domains="domains",
+    evolvability="Evolvability NicheBand NicheEvolvability bootstrap_elites genotype_evolvability "
+    "l_evolvability niche_evolvability prior_sensitivity",
+    execution="Threads",
+    landscape="landscape",
+    niches="CVTNiches GridNiches Niches one_hot",
+    pyribs="from_ribs",
+    search="BuildConfig curiosity",
+    studies="studies",
+    variation="variation",
+    verification="Verification verify",
+    walks="walk walks",
+)

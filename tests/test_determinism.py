@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 import nichechain as nc
 from nichechain import variation
-from nichechain.archive.build import build
+from nichechain.archive.building import build
 from nichechain.core.randomness import Purpose
 from nichechain.domains import Evaluation, FetchPickAndPlace, PlanarArm
 from nichechain.domains.base import Domain
@@ -151,7 +151,7 @@ import numpy as np
 import torch
 random.seed(1); np.random.seed(2); torch.manual_seed(3)
 from dataclasses import replace
-from nichechain.archive.build import build
+from nichechain.archive.building import build
 from nichechain.search.config import BuildConfig
 from nichechain.domains import PlanarArm
 from nichechain.execution import Threads

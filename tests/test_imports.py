@@ -32,7 +32,7 @@ def test_importing_the_package_imports_nothing_heavy() -> None:
 
 
 def test_reading_an_archive_needs_no_search_library() -> None:
-    rooms = "archive.build, births, domains, evolvability, execution, search.map_elites, archive.write"
+    rooms = "archive.building, births, domains, evolvability, execution, search.map_elites, archive.write"
     assert imported("\n".join(f"import nichechain.{room}" for room in rooms.split(", ")), SEARCH) == []
 
 

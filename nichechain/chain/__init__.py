@@ -2,6 +2,16 @@
 
 from nichechain.chain.counts import TransitionCounts
 from nichechain.chain.estimators import ESTIMATORS, UNVISITED, estimate
+from nichechain.chain.filters import counts_of
 from nichechain.chain.model import NicheChain
+from nichechain.chain.posterior import DirichletPosterior
 
-__all__ = ["ESTIMATORS", "UNVISITED", "NicheChain", "TransitionCounts", "estimate"]
+__all__ = [
+    "ESTIMATORS",
+    "UNVISITED",
+    "DirichletPosterior",
+    "NicheChain",
+    "TransitionCounts",
+    "counts_of",
+    "estimate",
+]

@@ -8,6 +8,8 @@ import os
 import sys
 from collections.abc import Sequence
 
+__all__ = ["COMMANDS", "main"]
+
 COMMANDS = {
     "domains": "what can be searched, with bounds and genotype lengths",
     "build": "fill an archive: MAP-Elites that records who was born where",

@@ -159,7 +159,7 @@ def run(arguments: Sequence[str]) -> int:
     command = parsing.parse(BuildCommand, arguments)
     from nichechain import execution
     from nichechain.archive import read, write
-    from nichechain.archive.build import build
+    from nichechain.archive.building import build
     from nichechain.archive.trust import check_trusted
     from nichechain.core.files import writing
     from nichechain.search.making import make_domain

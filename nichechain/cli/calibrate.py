@@ -39,7 +39,7 @@ def run(arguments: Sequence[str]) -> int:
     from nichechain import execution
     from nichechain.archive import read
     from nichechain.archive.archive import load
-    from nichechain.archive.calibrate import calibrate
+    from nichechain.archive.calibrating import calibrate
 
     shown = output.console()
     before = read.read_meta(command.path)

@@ -14,7 +14,7 @@ def lazily(package: str, **homes: str) -> tuple[Callable[[str], Any], Callable[[
     ----------
     package : str
     **homes
-        Names, with spaces between them, by the module of the package that they are in.
+        Names, with spaces between them, by the module of the package that they are in. A module is in itself.
 
     Returns
     -------
@@ -27,8 +27,9 @@ def lazily(package: str, **homes: str) -> tuple[Callable[[str], Any], Callable[[
     }
 
     def getattribute(name: str) -> Any:
-        if name in modules:
-            return getattr(importlib.import_module(modules[name]), name)
-        raise AttributeError(f"module {package!r} has no attribute {name!r}")
+        if name not in modules:
+            raise AttributeError(f"module {package!r} has no attribute {name!r}")
+        home = importlib.import_module(modules[name])
+        return home if modules[name] == f"{package}.{name}" else getattr(home, name)
 
     return getattribute, lambda: list(modules)

@@ -6,11 +6,15 @@ niches in expectation. Two conventions give the paper's "walks of length l + 1" 
 the paper demands. Under ``procedure`` the root's state counts, as its steps say literally.
 """
 
+from nichechain.evolvability.coverage import expected_coverage, rarefied_coverage, sampled_coverage
 from nichechain.evolvability.genotypes import FirstGeneration, genotype_evolvability
 from nichechain.evolvability.niches import l_evolvability, niche_evolvability
 from nichechain.evolvability.question import DRAWS, Convention, Method, Question
+from nichechain.evolvability.reach import Reach, reach, visit_probability
 from nichechain.evolvability.results import Evolvability, NicheEvolvability
 from nichechain.evolvability.uncertainty import NicheBand, bootstrap_elites, prior_sensitivity
+from nichechain.evolvability.visits import VisitMetrics, uniformity, visit_entropy, visit_metrics
+from nichechain.evolvability.where_to_sample import evolvability_derivative, where_to_sample
 
 __all__ = [
     "DRAWS",
@@ -21,9 +25,21 @@ __all__ = [
     "NicheBand",
     "NicheEvolvability",
     "Question",
+    "Reach",
+    "VisitMetrics",
     "bootstrap_elites",
+    "evolvability_derivative",
+    "expected_coverage",
     "genotype_evolvability",
     "l_evolvability",
     "niche_evolvability",
     "prior_sensitivity",
+    "rarefied_coverage",
+    "reach",
+    "sampled_coverage",
+    "uniformity",
+    "visit_entropy",
+    "visit_metrics",
+    "visit_probability",
+    "where_to_sample",
 ]

@@ -19,9 +19,9 @@ are; evolution strategies follow a convention, see :class:`Recording`.
 
 from __future__ import annotations
 
-import importlib
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from nichechain.core.lazy import lazily
 from nichechain.pyribs.conversion import from_ribs, to_ribs
 from nichechain.pyribs.recording import Recording, record
 
@@ -30,9 +30,5 @@ if TYPE_CHECKING:
 
 __all__ = ["MutationEmitter", "Recording", "from_ribs", "record", "to_ribs"]
 
-
-def __getattr__(name: str) -> Any:
-    # An emitter is a class of pyribs, whose import takes seconds.
-    if name == "MutationEmitter":
-        return importlib.import_module("nichechain.pyribs.emitters").MutationEmitter
-    raise AttributeError(f"module 'nichechain.pyribs' has no attribute {name!r}")
+# An emitter is a class of pyribs, whose import takes seconds.
+__getattr__, __dir__ = lazily(__name__, emitters="MutationEmitter")

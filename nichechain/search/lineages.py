@@ -123,7 +123,7 @@ class Stretch:
 
 @dataclass(frozen=True)
 class Calibration:
-    """Lineage births that were added to a finished build, see :mod:`nichechain.archive.calibrate`.
+    """Lineage births that were added to a finished build, see :mod:`nichechain.archive.calibrating`.
 
     Parameters
     ----------

@@ -13,6 +13,7 @@ from nichechain.core.checks import check_choice
 from nichechain.core.errors import NichechainError
 from nichechain.variation.additive import BOUND_KINDS, AdditiveMutation, Bound, Mutation
 from nichechain.variation.noise import BallNoise, CauchyNoise, GaussianNoise, MutationNoise, StudentTNoise
+from nichechain.variation.polynomial import PolynomialMutation
 from nichechain.variation.self_adaptive import SelfAdaptiveDomain, SelfAdaptiveMutation
 
 __all__ = [
@@ -20,6 +21,7 @@ __all__ = [
     "AdditiveMutation",
     "Bound",
     "Mutation",
+    "PolynomialMutation",
     "SelfAdaptiveDomain",
     "SelfAdaptiveMutation",
     "cauchy",

@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 from nichechain import Archive, NicheChain, build, load
-from nichechain.archive.build import BuildProgress
+from nichechain.archive.building import BuildProgress
 from nichechain.core.errors import ArchiveError, NichechainError
 from nichechain.domains import FetchPickAndPlace, PlanarArm
 from nichechain.execution import Threads

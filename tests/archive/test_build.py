@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from nichechain.archive import filling as building
 from nichechain.archive import read, write
-from nichechain.archive.build import BuildProgress, build
+from nichechain.archive.building import BuildProgress, build
 from nichechain.core.errors import ArchiveError, NichechainError
 from nichechain.domains import Evaluation, PlanarArm
 from nichechain.domains.base import Domain

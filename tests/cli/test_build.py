@@ -130,18 +130,18 @@ def test_unknown_domain(tmp_path, capsys):
 def test_interrupt_keeps_what_is_done_and_says_how_to_go_on(tmp_path):
     folder = tmp_path / "arm"
     script = (
-        "import sys, nichechain.archive.filling as building, nichechain.cli as cli\n"
+        "import sys, nichechain.cli as cli; from nichechain.archive import filling as building\n"
         "building.CHECKPOINT_SECONDS = 0.2\n"
         f"sys.exit(cli.main({build(folder, 100_000)!r}))\n"
     )
     process = subprocess.Popen(
         [sys.executable, "-c", script], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
     )
-    deadline = time.monotonic() + 60
+    deadline = time.monotonic() + 300
     while not (folder / "meta.json").exists() and time.monotonic() < deadline:
         time.sleep(0.02)
     os.kill(process.pid, signal.SIGINT)
-    shown, _ = process.communicate(timeout=30)
+    shown, _ = process.communicate(timeout=120)
     assert process.returncode == 130
     assert f"nichechain build arm --out {folder} --resume" in shown
     kept = nc.load(folder).meta

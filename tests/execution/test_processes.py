@@ -13,7 +13,7 @@ import pytest
 
 import nichechain
 from nichechain import variation
-from nichechain.archive.build import build
+from nichechain.archive.building import build
 from nichechain.core.errors import NichechainError
 from nichechain.domains import FetchPickAndPlace
 from nichechain.execution import Executor, Processes, Threads, evaluate_rows

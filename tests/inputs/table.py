@@ -106,9 +106,11 @@ def check_refused(call: Call, parameter: str, value: Any, world: World) -> None:
     arguments[parameter] = value.make(world) if isinstance(value, Made) else value
     with pytest.raises(NichechainError) as raised:
         call.function(**arguments)
-    check_sentence(str(raised.value))
+    message = str(raised.value)
+    check_sentence(message)
     if not isinstance(value, Made):
-        assert names(str(raised.value), parameter, value), str(raised.value)
+        assert names(message, parameter), f"{parameter} is not named: {message}"
+        assert _ALLOWED.search(message), f"nothing is said of what is allowed: {message}"
 
 
 def check_sentence(message: str) -> None:
@@ -127,7 +129,26 @@ _CALLED = {
     "controller": "layer sizes",
     "folders": "archive",
     "groups": "values",
+    "batch": "batches",
+    "count": "archive_count",
+    "env_id": "environment",
+    "env_options": "environment",
+    "flat": "niche",
+    "high": "genes",
+    "level": "fraction",
     "levels": "fraction",
+    "limit": "archive_limit",
+    "low": "genes",
+    "min_births": "births",
+    "most": "max_failed",
+    "name": "(mutation|metric|domain|measure|study)",
+    "number": "niche",
+    "output": "activation",
+    "path": "(folder|archive)",
+    "probability": "archive_probability",
+    "size": "(step_bound|elites)",
+    "state": "niche",
+    "text": "(shape|noise|niche|bound|step_bound|layer_scale)",
     "values": "run",
     "child": "(state|children)",
     "bound": "bounded",
@@ -144,26 +165,31 @@ _CALLED = {
     "population": "offspring",
     "states": "(niche|lineages)",
     "target": "niche",
-    "scheme": "archive",
+    "scheme": "(archive|initialisation)",
     "shape": "axes",
-    "sizes": "(layer_size|grid)",
+    "sizes": "(layer_size|grid|shape)",
     "transition": "T",
 }
 """What a parameter goes by in messages, where that is not its name."""
 
 
-def names(message: str, parameter: str, value: Any) -> bool:
-    """Whether the message speaks of the parameter or shows the value."""
-    shown = {str(value), repr(value)}
-    if isinstance(value, float) and math.isfinite(value):
-        shown.add(f"{value:g}")
-    one = parameter.removesuffix("s")
-    said = {parameter, one, parameter.replace("_", " "), one.replace("_", " ")} | {
-        _CALLED.get(parameter, parameter)
-    }
-    return any(text in message for text in shown) or any(
-        re.search(rf"\b{word}s?\b", message) for word in said
-    )
+_ALLOWED = re.compile(
+    r"\b(must|at least|at most|between|only|needs?|needed|such as|there is no|cannot"
+    # A range, or how many there are.
+    r"|-?\d+ to -?\d+|runs? from|has \(?\d+|have \d+: one|its? \w+ is|numbered from"
+    # Of what kind values are not, and to what else a parameter belongs.
+    r"|that are (no|not|negative)|which|belongs? to|nothing|no spread|neither|are missing"
+    r"|has no|it has|the last is|up to|one to \d+|but \d+ axes|one scale per"
+    r"|not finite|either|differ|not negative|would be empty)\b"
+)
+"""Words that say what would do instead."""
+
+
+def names(message: str, parameter: str) -> bool:
+    """Whether the message speaks of the parameter: by its name, or by what it goes by."""
+    said = {parameter, parameter.removesuffix("s")}
+    words = said | {word.replace("_", " ") for word in said} | {_CALLED.get(parameter, parameter)}
+    return any(re.search(rf"\b{word}s?\b", message) for word in words)
 
 
 def check_accepted(call: Call, world: World) -> None:

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from nichechain import variation
 from nichechain.archive import read
-from nichechain.archive.build import build
+from nichechain.archive.building import build
 from nichechain.core.errors import NichechainError
 from nichechain.domains import Evaluation, PlanarArm
 from nichechain.domains.base import Domain

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from nichechain.archive import read
-from nichechain.archive.build import build
+from nichechain.archive.building import build
 from nichechain.births.table import NONE
 from nichechain.domains import PlanarArm
 from nichechain.execution import Threads

@@ -18,7 +18,7 @@ from scipy import stats
 
 from nichechain import variation
 from nichechain.archive import read
-from nichechain.archive.build import build
+from nichechain.archive.building import build
 from nichechain.core.errors import NichechainError
 from nichechain.domains import Evaluation, PlanarArm
 from nichechain.execution import Threads

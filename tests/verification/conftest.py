@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from nichechain import births
 from nichechain.archive import read, write
 from nichechain.archive.archive import Archive, load
-from nichechain.archive.build import build
+from nichechain.archive.building import build
 from nichechain.domains import Evaluation, PlanarArm
 from nichechain.execution import Threads
 from nichechain.search.config import BuildConfig

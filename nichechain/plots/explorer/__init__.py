@@ -35,6 +35,8 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 
+__all__ = ["LONGEST", "write_explorer"]
+
 LONGEST = 10
 """Generations that the page's slider goes up to."""
 

@@ -25,7 +25,7 @@ from pathlib import Path
 import ribs.archives
 import pyarrow.parquet
 from nichechain.archive import filling, read, write
-from nichechain.archive.build import build
+from nichechain.archive.building import build
 from nichechain.search.config import BuildConfig
 from nichechain.execution import Threads
 from nichechain.core.randomness import Purpose

@@ -11,7 +11,7 @@ import pytest
 
 from nichechain.archive import read
 from nichechain.archive import read as committed
-from nichechain.archive.build import build
+from nichechain.archive.building import build
 from nichechain.core.errors import ArchiveError
 from nichechain.execution import Threads
 

@@ -189,7 +189,7 @@ SMALL_DISK = """
 import shutil, subprocess, sys
 from pathlib import Path
 from nichechain.archive import read, write
-from nichechain.archive.build import build
+from nichechain.archive.building import build
 from nichechain.search.config import BuildConfig
 from nichechain.core.errors import ArchiveError
 from nichechain.execution import Threads

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from nichechain.archive.archive import load
-from nichechain.archive.build import build
+from nichechain.archive.building import build
 from nichechain.execution import Threads
 from nichechain.search.config import BuildConfig
 

@@ -14,7 +14,7 @@ import pytest
 from nichechain.archive import filling as building
 from nichechain.archive import read, write
 from nichechain.archive.archive import load
-from nichechain.archive.build import build
+from nichechain.archive.building import build
 from nichechain.core.errors import ArchiveError
 from nichechain.core.files import writing
 from nichechain.execution import Threads
