@@ -151,7 +151,7 @@ class Archive:
         return make_mutation(self.config, domain)
 
     def elite(self, niche: Niche) -> Elite:
-        """The elite of a niche.
+        """The elite of a niche, or of the outside state (``"outside"``, or its id).
 
         Raises
         ------
@@ -160,15 +160,13 @@ class Archive:
         """
         if self.meta.imported and not len(self.elites):
             raise ArchiveError(f"{self.folder} was imported, so it has births but no elites")
-        state = self.niches.flat(niche)
+        state = self.niches.state(niche)
         row = np.searchsorted(self.elites.niche, state)
         if row == len(self.elites) or self.elites.niche[row] != state:
-            raise NichechainError(
-                f"niche {self.niches.label(state)} is empty: "
-                f"{self.filled} of {len(self.niches)} have an elite"
-            )
+            who = "the outside state" if state == len(self.niches) else f"niche {self.niches.label(state)}"
+            raise NichechainError(f"{who} is empty: {self.filled} of {len(self.niches)} have an elite")
         return Elite(
-            self.niches.index(state),
+            None if state == len(self.niches) else self.niches.index(state),
             state,
             self.elites.genotype[row],
             self.elites.behavior[row],

@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pyarrow as pa
+from numpy.typing import NDArray
 
 from nichechain.archive import read, write
 from nichechain.archive.filling import BuildProgress, Filling, count
+from nichechain.births.table import NONE
 from nichechain.core.errors import ArchiveError
 from nichechain.core.files import writing
 from nichechain.domains.base import Domain
 from nichechain.execution import Executor
 from nichechain.search import savings
+from nichechain.search.bounds import FirstLook
 from nichechain.search.config import MOST_FAILED, BuildConfig
 from nichechain.search.failures import Failures, check_first_batch
 from nichechain.search.making import make_domain, make_mutation, make_niches
@@ -93,12 +98,25 @@ def build(
         search.savings = savings.read(folder) if state is not None else search.savings
         writer = write.Writer(folder, config, read.DomainFacts.of(domain), niches=niches)
 
-        def check_first(rows: pa.Table) -> None:
-            if search.step == 0 and len(rows) == search.births:
+        first_look = FirstLook(len(niches), search.births)
+
+        def look(rows: pa.Table) -> None:
+            if len(rows) == search.births:
                 check_first_batch(rows, domain, config.seed)
+            note = first_look.tell(*_landed(rows), last=search.births >= config.evaluations)
+            if note is not None:
+                # Of whoever called build(), with Filling between.
+                warnings.warn(note, stacklevel=4)
 
         filling = Filling(folder, search, writer, failures, outside, len(niches), on_progress)
-        filling.go(config.evaluations, executor, check_first)
+        filling.go(config.evaluations, executor, look)
+
+
+def _landed(rows: pa.Table) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Behavior and state of some births; NaN, and -1, where they failed."""
+    axes = [name for name in rows.column_names if name.startswith("behavior_")]
+    behavior = np.stack([rows[name].fill_null(np.nan).to_numpy() for name in axes], axis=1)
+    return behavior, rows["child_niche"].fill_null(NONE).to_numpy()
 
 
 def _check_continues(old: BuildConfig, new: BuildConfig, births: int, folder: Path) -> None:

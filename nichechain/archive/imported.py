@@ -125,6 +125,9 @@ def import_births(
     missing = [name for name in columns.names if name not in table.column_names]
     if missing:
         raise NichechainError(f"{log} has no column {missing[0]!r}: it has {', '.join(table.column_names)}")
+    twice = [name for name in columns.names if table.column_names.count(name) > 1]
+    if twice:
+        raise NichechainError(f"{log} has column {twice[0]!r} more than once: rename all but one")
     if not len(table):
         raise NichechainError(f"{log} has no rows, but every birth is one")
     if not (axes.names or isinstance(columns.child, str)):
@@ -229,7 +232,7 @@ class _Reader:
     def births(self, columns: Columns) -> pa.Table:
         """The rows as births."""
         size, dimensions = len(self.table), len(self.niches.bounds)
-        parent, _ = self._states(columns.parent)
+        parent, _ = self._states(columns.parent, whole=True)
         child, behavior = self._states(columns.child)
         run = self._runs(columns.run)
         uid = self._whole(columns.uid, lowest=0) if columns.uid else _within_runs(run)
@@ -277,8 +280,8 @@ class _Reader:
             raise NichechainError(f"a number is too large to be imported: {error}") from error
         return pa.Table.from_arrays(cast, schema=schema)
 
-    def _states(self, given: str | tuple[str, ...]) -> tuple[Ints, Floats | None]:
-        """States, and behavior where that is what is given."""
+    def _states(self, given: str | tuple[str, ...], *, whole: bool = False) -> tuple[Ints, Floats | None]:
+        """States, and behavior where that is what is given; ``whole`` ones have all of it or none."""
         if isinstance(given, str):
             state = self._whole(given, lowest=0, nulls=True)
             odd = state >= self.niches.states
@@ -292,12 +295,18 @@ class _Reader:
         if len(given) != axes:
             raise NichechainError(f"behavior has columns {', '.join(given)}, but the grid has {axes} axes")
         behavior = np.stack([self._numbers(name) for name in given], axis=1)
-        known = ~np.isnan(behavior).any(axis=1)
+        missing = np.isnan(behavior)
+        half = missing.any(axis=1) & ~missing.all(axis=1)
+        # A parent without any is that of an initial birth; half a behavior is a mistake.
+        if whole and half.any():
+            raise NichechainError(f"row {_row(half)} has only some of {', '.join(given)}: give all or none")
+        known = ~missing.any(axis=1)
         state = np.full(len(behavior), NONE, np.int64)
         endless = known & np.isinf(behavior).any(axis=1)
         if endless.any():
             raise NichechainError(f"row {_row(endless)} has an infinite behavior, which belongs to no niche")
-        state[known] = self.niches.of(behavior[known])
+        narrow = all(pa.types.is_float32(self.table[name].type) for name in given)
+        state[known] = self.niches.of(behavior[known].astype(np.float32 if narrow else np.float64))
         return state, behavior
 
     def _numbers(self, name: str) -> Floats:
@@ -315,15 +324,17 @@ class _Reader:
         column = self.table[name]
         # Numbers beyond 2**53 would not survive being floating-point.
         if pa.types.is_integer(column.type) and not column.null_count:
+            if pa.types.is_uint64(column.type) and (pc.max(column).as_py() or 0) >= 2**63:
+                raise NichechainError(f"{name} has {pc.max(column)}, but a whole number is less than 2**63")
             whole: Ints = column.to_numpy().astype(np.int64)
             none = np.zeros(whole.size, bool)
         else:
             values = self._numbers(name)
             none = np.isnan(values)
-            odd = ~none & (values != np.floor(values))
+            odd = ~none & ~((values == np.floor(values)) & (np.abs(values) < 2.0**63))
             if odd.any():
                 raise NichechainError(
-                    f"row {_row(odd)} has {name} {values[odd][0]:g}, but must have a whole number"
+                    f"row {_row(odd)} has {name} {values[odd][0]:g}, but must have a whole number below 2**63"
                 )
             whole = np.where(none, NONE, values).astype(np.int64)
         low = ~none & (whole < lowest)
@@ -355,17 +366,24 @@ class _Reader:
             raise NichechainError(
                 f"row {_row(column.is_null().to_numpy())} has no {name}, but every birth must have one"
             )
-        known = pc.unique(column).to_pylist()
-        number = {run: k for k, run in enumerate(sorted(known))}
-        return np.array([number[run] for run in column.to_pylist()], np.int64)
+        if pa.types.is_nested(column.type):
+            raise NichechainError(f"column {name!r} has values of type {column.type}, but must name runs")
+        if pa.types.is_floating(column.type) and pc.any(pc.is_nan(column)).as_py():
+            odd = pc.is_nan(column).to_numpy()
+            raise NichechainError(f"row {_row(odd)} has no {name}, but every birth must have one")
+        known = column.combine_chunks().dictionary_encode()
+        # Numbers in the order of the runs' names, not of their first rows.
+        order = np.argsort(pc.array_sort_indices(known.dictionary).to_numpy())
+        run: Ints = order[known.indices.to_numpy()].astype(np.int64)
+        return run
 
 
 def _within_runs(run: Ints) -> Ints:
     """Numbers from 0 within each run."""
+    order = np.argsort(run, kind="stable")
+    births = np.bincount(run)
     uid = np.empty_like(run)
-    for number in range(int(run.max()) + 1):
-        own = run == number
-        uid[own] = np.arange(np.count_nonzero(own))
+    uid[order] = np.arange(run.size) - np.repeat(np.cumsum(births) - births, births)
     return uid
 
 

@@ -24,6 +24,7 @@ from nichechain import births
 from nichechain.archive import untrusted
 from nichechain.births.table import LINEAGE, Offspring
 from nichechain.core.errors import ArchiveError
+from nichechain.core.text import printable_values
 from nichechain.domains.base import Domain
 from nichechain.niches import Niches
 from nichechain.search.config import BuildConfig
@@ -185,7 +186,7 @@ def read_meta(folder: Path) -> Meta:
             )
         if values.pop("sha256") != checksum(values):
             raise ValueError(_NOT_COMMITTED)
-        return _meta(values)
+        return _meta(printable_values(values))
 
 
 def _meta(values: dict[str, Any]) -> Meta:

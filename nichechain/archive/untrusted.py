@@ -23,6 +23,7 @@ import pyarrow.parquet as pq
 from numpy.typing import DTypeLike, NDArray
 
 from nichechain.archive.parquet_pages import decoded_size
+from nichechain.core.text import printable
 
 LONGEST_STRING = 1000
 """Bytes of the longest string in a table that is believed."""
@@ -190,4 +191,7 @@ def _spelled_out(texts: pa.ChunkedArray) -> pa.ChunkedArray:
         longest = pc.max(pc.binary_length(chunk.dictionary)).as_py() if len(chunk.dictionary) else 0
         if (longest or 0) > LONGEST_STRING:
             raise ValueError(f"it has a string of {longest} bytes, more than {LONGEST_STRING}")
-    return texts.cast(pa.string())
+    plain = texts.cast(pa.string())
+    if all(text.isprintable() for chunk in texts.chunks for text in chunk.dictionary.to_pylist() if text):
+        return plain
+    return pa.chunked_array([[None if t is None else printable(t) for t in plain.to_pylist()]], pa.string())

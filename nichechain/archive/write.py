@@ -151,9 +151,13 @@ class Writer:
         try:
             yield
         except OSError as error:
-            raise ArchiveError(
-                f"{error.filename or self._folder} cannot be written: {error.strerror or error}; "
+            kept = (
                 f"the last commit, of {self._committed} births, is whole: another build goes on from there"
+                if self._committed
+                else "nothing was kept, since nothing had been committed"
+            )
+            raise ArchiveError(
+                f"{error.filename or self._folder} cannot be written: {error.strerror or error}; {kept}"
             ) from error
 
     def _write_full_parts(self) -> None:

@@ -18,6 +18,7 @@ from scipy.optimize import minimize_scalar
 from nichechain.births.families import elites_of
 from nichechain.chain.counts import TransitionCounts
 from nichechain.chain.families import orphans_of
+from nichechain.core.arrays import entries_at
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -101,7 +102,7 @@ def strength_of(counts: TransitionCounts, base: Callable[[Ints, Ints], Floats]) 
     own = left.family * (left.family - 1)
     size = counts.births[left.parent] - left.family
     effect = 1.0 + sibling_correlation(counts) * (pairs[left.parent] - own) / np.maximum(1, size)
-    count = np.asarray(counts.matrix[left.parent, left.child]).ravel()
+    count = entries_at(counts.matrix, left.parent, left.child)
     others, size = (count - left.children) / effect, size / effect
 
     def foretold(log_strength: float) -> Floats:

@@ -12,7 +12,7 @@ from scipy import sparse
 from nichechain.chain.operator import PooledTransition
 from nichechain.core.errors import NichechainError
 from nichechain.core.notebook import facts_table
-from nichechain.niches import Niche, Niches
+from nichechain.niches import OUTSIDE, Niche, Niches
 
 if TYPE_CHECKING:
     import networkx as nx
@@ -117,7 +117,7 @@ class NicheChain:
         return None if self.counts is None else self.counts.births
 
     def state(self, niche: Niche) -> int:
-        """Flat id of a niche given as flat id or grid index.
+        """Flat id of a niche given as flat id or grid index, or of the outside state.
 
         Raises
         ------
@@ -125,7 +125,9 @@ class NicheChain:
             If there is no such niche.
         """
         if self.niches is not None:
-            return self.niches.flat(niche)
+            return self.niches.state(niche)
+        if self.outside is not None and niche in (OUTSIDE, self.outside):
+            return self.outside
         if not isinstance(niche, (int, np.integer)):
             raise NichechainError(f"niche is {niche}, but this chain has no grid: give its number")
         if not 0 <= niche < self.n_niches:

@@ -44,7 +44,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     int
         Exit status: 0, 2 for bad input, 130 if interrupted.
     """
-    given = list(sys.argv[1:] if arguments is None else arguments)
+    from nichechain.cli import streams
+
+    with streams.prepared():
+        return _run(list(sys.argv[1:] if arguments is None else arguments))
+
+
+def _run(given: Sequence[str]) -> int:
     debug = "--debug" in given
     words = [word for word in given if word != "--debug"]
     if not words or words[0] in ("-h", "--help", "help"):

@@ -143,8 +143,8 @@ def _domain_option(text: str) -> tuple[str, DomainOption]:
     name, equals, value = text.partition("=")
     if not name or not equals:
         raise NichechainError(f"option {text!r} of the domain must be NAME=VALUE, such as joints=20")
-    if value in ("true", "false"):
-        return name, value == "true"
+    if value.lower() in ("true", "false"):
+        return name, value.lower() == "true"
     for kind in (int, float):
         try:
             return name, kind(value)

@@ -8,6 +8,7 @@ bit from rows scored alone. Adding from left to right, with a padding of zeros a
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -90,3 +91,12 @@ def checked_own(itself: ArrayLike | None, points: Floats, others: Floats) -> Int
             f"itself is {own.tolist()}, but must be {queries} numbers from -1 to {size - 1}, one per query"
         )
     return own
+
+
+def entries_at(matrix: Any, rows: Ints, columns: Ints) -> Floats:
+    """Entries of a matrix, dense or sparse, at some pairs, (N,); none of no pairs."""
+    if not rows.size:
+        # SciPy's answer to empty indices is a sparse matrix.
+        return np.zeros(0)
+    found: Floats = np.asarray(matrix[rows, columns], np.float64).ravel()
+    return found

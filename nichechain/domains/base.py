@@ -24,8 +24,8 @@ class Evaluation:
 
     Parameters
     ----------
-    behavior : (N, B) float64 array
-        NaN in the rows that failed.
+    behavior : (N, B) float64 or float32 array
+        NaN in the rows that failed. Bounds of niches are compared in the precision that it has.
     objective : (N,) float64 array
         Larger is better; NaN in the rows that failed.
     failed : (N,) bool array
@@ -59,8 +59,11 @@ class Evaluation:
             spread = np.concatenate(
                 [np.full_like(p.behavior, np.nan) if p.spread is None else p.spread for p in parts]
             )
+        # Rows that failed have no precision of their own.
+        told = {part.behavior.dtype for part in parts if not part.failed.all()}
+        behavior = np.concatenate([part.behavior for part in parts])
         return Evaluation(
-            np.concatenate([part.behavior for part in parts]),
+            behavior.astype(told.pop()) if len(told) == 1 else behavior,
             np.concatenate([part.objective for part in parts]),
             np.concatenate([part.failed for part in parts]),
             tuple(reason for part in parts for reason in part.reasons),

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from nichechain.core.errors import NichechainError
+from nichechain.niches.base import precision_of
 
 Floats = NDArray[np.float64]
 
@@ -68,7 +69,8 @@ def final_xy(episode: Episode) -> Floats:
     if "x_position" in info and "y_position" in info:
         return np.array([info["x_position"], info["y_position"]], np.float64)
     if isinstance(episode.last, Mapping) and "achieved_goal" in episode.last:
-        return np.asarray(episode.last["achieved_goal"], np.float64)[:2]
+        goal: Floats = np.asarray(episode.last["achieved_goal"])[:2]
+        return goal
     raise NichechainError(
         "final-xy finds neither x_position and y_position in the info nor achieved_goal: "
         "take final-observation:I,J or a function of your own"
@@ -88,7 +90,7 @@ class FinalObservation:
 
     def __call__(self, episode: Episode) -> Floats:
         """Behavior (B,)."""
-        return episode.observations[-1, list(self.columns)]
+        return episode.observations[-1, list(self.columns)].astype(_precision(episode.last))
 
 
 @dataclass(frozen=True)
@@ -125,7 +127,8 @@ class FinalInfo:
         for key in self.keys:
             if key not in info:
                 raise NichechainError(f"the last info has no {key!r}: it has {', '.join(info) or 'nothing'}")
-        return np.array([info[key] for key in self.keys], np.float64)
+        values = np.array([info[key] for key in self.keys])
+        return values if values.dtype.kind == "f" else values.astype(np.float64)
 
 
 @dataclass(frozen=True)
@@ -198,6 +201,12 @@ def named(text: str) -> tuple[Descriptor, tuple[str, ...] | None]:
         f"descriptor is {text!r}, but must be final-xy, final-observation:I,J, mean-observation:I,J, "
         "final-info:KEY,KEY or MODULE:FUNCTION"
     )
+
+
+def _precision(observation: Any) -> np.dtype[np.floating[Any]]:
+    """The precision of an observation: of a dict, the longest of its arrays'."""
+    parts = observation.values() if isinstance(observation, Mapping) else [observation]
+    return max((precision_of(part) for part in parts), key=lambda kind: kind.itemsize)
 
 
 def _is_number(word: str) -> bool:

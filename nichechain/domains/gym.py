@@ -19,7 +19,7 @@ from nichechain.domains.policies.controllers import MLP, Controller
 from nichechain.domains.policies.networks import network
 from nichechain.domains.policies.spaces import Actions, Observations, actions_of
 from nichechain.niches import parse_bounds
-from nichechain.niches.base import check_bounds
+from nichechain.niches.base import check_bounds, precision_of
 
 if TYPE_CHECKING:
     from torch import nn
@@ -292,6 +292,7 @@ class GymDomain:
         behavior = np.full((len(rows), axes), np.nan)
         objective = np.full(len(rows), np.nan)
         reasons = [""] * len(rows)
+        precisions: set[np.dtype[Any]] = set()
         for i, (genotype, reset, seed) in enumerate(zip(rows, resets.tolist(), seeds.tolist(), strict=True)):
             if not np.isfinite(genotype).all():
                 reasons[i] = "genotype is not finite"
@@ -300,7 +301,9 @@ class GymDomain:
             episode = self._episode(env, genotype, reset, noise, seed)
             reasons[i] = _physics_failure(episode.env)
             if not reasons[i]:
-                described = np.array(self._descriptor(episode), np.float64)
+                given = self._descriptor(episode)
+                precisions.add(precision_of(given))
+                described = np.array(given, np.float64)
                 if described.shape != (axes,):
                     raise NichechainError(
                         f"the descriptor gives an array of shape {described.shape}, "
@@ -313,7 +316,10 @@ class GymDomain:
                     reasons[i] = "behavior is not finite"
             # Not before the descriptor is done with its state.
             self._idle.append(env)
-        return Evaluation(behavior, objective, np.array([bool(reason) for reason in reasons]), tuple(reasons))
+        failed = np.array([bool(reason) for reason in reasons])
+        if len(precisions) == 1:
+            behavior = behavior.astype(precisions.pop())
+        return Evaluation(behavior, objective, failed, tuple(reasons))
 
     def _episode(self, env: Any, genotype: Float32s, reset: int, noise: Noise, seed: int) -> Episode:
         act = _policy(self.network, genotype)

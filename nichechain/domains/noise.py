@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Protocol, runtime_checkable
 
 import numpy as np
@@ -182,6 +182,8 @@ def average(repeats: Sequence[Evaluation]) -> Evaluation:
         repeats does.
     """
     count = len(repeats)
+    # A mean has more digits than what it is the mean of.
+    repeats = [replace(part, behavior=part.behavior.astype(np.float64)) for part in repeats]
     failed = np.logical_or.reduce([part.failed for part in repeats])
     # Python's sum adds one repeat after another, so that a row's bits do not depend on the batch.
     mean = np.asarray(sum(part.behavior for part in repeats) / count)

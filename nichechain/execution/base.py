@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from nichechain.core.checks import check_at_least
 from nichechain.core.errors import NichechainError
+from nichechain.core.text import printable
 from nichechain.domains.base import Domain, Evaluation
 
 WORKER_DIED = "worker died"
@@ -105,7 +106,7 @@ def reason_of(error: BaseException) -> str:
 
 
 def _storable(reason: str) -> str:
-    return reason.encode("utf-8", "backslashreplace")[:_LONGEST_REASON].decode("utf-8", "ignore")
+    return printable(reason).encode("utf-8", "backslashreplace")[:_LONGEST_REASON].decode("utf-8", "ignore")
 
 
 def _checked(domain: Domain, evaluation: Evaluation, rows: int) -> Evaluation:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from nichechain.niches.base import OUTSIDE_MODES, Niche, Niches, one_hot
+from nichechain.niches.base import OUTSIDE, OUTSIDE_MODES, Niche, Niches, one_hot
 from nichechain.niches.cvt import CVTNiches
 from nichechain.niches.grid import GridNiches
 from nichechain.niches.parsing import parse_bounds, parse_niche, parse_niches, parse_shape
 
 __all__ = [
+    "OUTSIDE",
     "OUTSIDE_MODES",
     "CVTNiches",
     "GridNiches",

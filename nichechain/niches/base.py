@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Final, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,8 +15,14 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bounds = tuple[tuple[float, float], ...]
 
-Niche = int | tuple[int, ...]
-"""A niche is its flat id or its index: of a grid one number per axis (C order, axis 0 is x)."""
+OUTSIDE: Final = "outside"
+"""How the outside state is called."""
+
+Niche = int | tuple[int, ...] | Literal["outside"]
+"""A niche is its flat id or its index: of a grid one number per axis (C order, axis 0 is x).
+
+Where a state is asked for, the outside state is one as well: by its name, or its id n.
+"""
 
 OUTSIDE_MODES = ("state", "absorb", "clip")
 
@@ -87,7 +93,7 @@ class Niches(ABC):
         Parameters
         ----------
         behavior : (N, B) array
-            Finite values.
+            Finite values. Of float32, a value that is a bound in that precision lies on the bound.
 
         Returns
         -------
@@ -99,6 +105,7 @@ class Niches(ABC):
         NichechainError
             If the shape does not fit or a value is not finite.
         """
+        precision = precision_of(behavior)
         points = as_floats("behavior", behavior)
         if points.ndim != 2 or points.shape[1] != len(self.bounds):
             raise NichechainError(f"behavior has shape {points.shape}, but must be (N, {len(self.bounds)})")
@@ -106,12 +113,32 @@ class Niches(ABC):
             raise NichechainError("behavior has NaN or infinite values, which belong to no niche")
         state = self._nearest(points)
         if self.outside != "clip":
-            state[~is_inside(points, self.bounds)] = len(self)
+            state[~is_inside(points, self.bounds, precision)] = len(self)
         return state
+
+    def state(self, niche: Niche) -> int:
+        """State of the chain, given as a niche or as the outside state.
+
+        Raises
+        ------
+        NichechainError
+            If there is no such state.
+        """
+        if isinstance(niche, str):
+            if niche != OUTSIDE:
+                raise NichechainError(f"niche is {niche!r}, but must be an index, a number, or {OUTSIDE!r}")
+            if self.outside == "clip":
+                raise NichechainError(
+                    "niche is 'outside', but these niches have no outside state: it is clipped"
+                )
+            return len(self)
+        if isinstance(niche, (int, np.integer)) and niche == len(self) and self.outside != "clip":
+            return len(self)
+        return self.flat(niche)
 
     def label(self, state: int) -> str:
         """How a state is called in tables and figures: its index, as ``"7,11"``, or ``"outside"``."""
-        return "outside" if state == len(self) else ",".join(map(str, self.index(state)))
+        return OUTSIDE if state == len(self) else ",".join(map(str, self.index(state)))
 
 
 MOST_NICHES = 10_000_000
@@ -125,9 +152,27 @@ def check_bounds(bounds: Bounds) -> None:
             raise NichechainError(f"bounds are {low:g} to {high:g}, but must be finite and increasing")
 
 
-def is_inside(points: Floats, bounds: Bounds) -> NDArray[np.bool_]:
-    """Whether each point (N, B) lies in the box, ends included."""
-    lower, upper = np.array(bounds).T
+def precision_of(behavior: object) -> np.dtype[np.floating[Any]]:
+    """The precision that behaviors came in: that of an array of short floats, or else float64."""
+    kind = getattr(behavior, "dtype", None)
+    short = isinstance(kind, np.dtype) and kind.kind == "f" and kind.itemsize < 8
+    return np.dtype(kind if short else np.float64)
+
+
+def is_inside(
+    points: Floats, bounds: Bounds, precision: np.dtype[np.floating[Any]] | None = None
+) -> NDArray[np.bool_]:
+    """Whether each point (N, B) lies in the box, ends included.
+
+    Parameters
+    ----------
+    points : (N, B) float64 array
+    bounds : tuple of (float, float)
+    precision : numpy.dtype, optional
+        That of the values behind the points. The bounds are rounded to it: 1.1 in float32 is larger
+        than 1.1, and lies on a bound of 1.1 all the same.
+    """
+    lower, upper = np.array(bounds).astype(precision or np.float64).astype(np.float64).T
     inside: NDArray[np.bool_] = ((points >= lower) & (points <= upper)).all(axis=1)
     return inside
 

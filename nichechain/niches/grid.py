@@ -91,7 +91,7 @@ class GridNiches(Niches):
                 raise NichechainError(f"niche is {niche}, but the grid has niches 0 to {len(self) - 1}")
             return int(niche)
         try:
-            index = tuple(operator.index(k) for k in niche)
+            index = tuple(operator.index(k) for k in niche)  # type: ignore[arg-type]  # a text raises
         except TypeError:
             raise NichechainError(
                 f"niche is {niche!r}, but must be a whole number or one per axis of the grid"

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from nichechain.core.errors import NichechainError
+from nichechain.niches.base import OUTSIDE, Niche
 
 
 def parse_shape(text: str, name: str = "shape") -> tuple[int, ...]:
@@ -49,19 +50,21 @@ def parse_bounds(text: str, name: str = "bounds") -> tuple[tuple[float, float], 
     return pairs
 
 
-def parse_niche(text: str, name: str = "niche") -> tuple[int, ...] | int:
-    """``"7,11"`` as ``(7, 11)``, ``"151"`` as ``151``.
+def parse_niche(text: str, name: str = "niche") -> Niche:
+    """``"7,11"`` as ``(7, 11)``, ``"151"`` as ``151``, ``"outside"`` as itself.
 
     Raises
     ------
     NichechainError
         If the text is no such thing.
     """
+    if text == OUTSIDE:
+        return OUTSIDE
     try:
         index = tuple(int(part) for part in text.split(","))
     except ValueError:
         raise NichechainError(
-            f"{name} is {text!r}, but must be a grid index such as 7,11 or a niche number such as 151"
+            f"{name} is {text!r}, but must be a grid index such as 7,11, a number such as 151, or outside"
         ) from None
     return index if len(index) > 1 else index[0]
 

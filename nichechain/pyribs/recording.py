@@ -17,6 +17,7 @@ from nichechain.core.checks import check_choice
 from nichechain.core.errors import NichechainError
 from nichechain.domains.base import Evaluation
 from nichechain.niches import Niches
+from nichechain.niches.base import is_inside, precision_of
 from nichechain.niches.ribs import niches_of
 from nichechain.pyribs.strategies import StrategyParent, centre, is_strategy
 
@@ -326,8 +327,7 @@ class Recording:
 
     def _states(self, measures: NDArray[Any], cell: Ints) -> Ints:
         """Cells as pyribs numbers them, and the outside state for what is out of range."""
-        low, high = self.niches.lower, self.niches.upper
-        inside = ((measures >= low) & (measures <= high)).all(axis=1)
+        inside = is_inside(measures.astype(np.float64), self.niches.bounds, precision_of(measures))
         return np.where(inside, cell, len(self.niches))
 
     def _note_elites(

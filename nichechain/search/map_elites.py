@@ -204,7 +204,7 @@ class MapElites:
         candidates = Elites(
             niche,
             offspring.genotype,
-            evaluation.behavior,
+            evaluation.behavior.astype(np.float64),
             evaluation.objective,
             self._keys(offspring.uid, evaluation.objective),
             offspring.uid,

@@ -21,6 +21,7 @@ from nichechain.chain.estimators import Unvisited, estimate
 from nichechain.chain.families import counts_of_families, families_of
 from nichechain.chain.model import NicheChain
 from nichechain.chain.posterior import DirichletPosterior
+from nichechain.core.arrays import entries_at
 from nichechain.core.checks import check_at_least
 from nichechain.core.errors import NichechainError
 from nichechain.core.randomness import Purpose, keyed
@@ -188,10 +189,10 @@ def probability_of(chain: NicheChain, parent: Ints, child: Ints) -> Floats:
     """T_ij of some pairs, without making a T that may be dense."""
     posterior = chain.posterior
     if posterior is None:
-        given: Floats = np.asarray(chain.T[parent, child]).ravel()
+        given: Floats = entries_at(chain.T, parent, child)
         return given
     births = (posterior.counts.births / posterior.design_effect)[parent]
-    own = np.asarray(posterior.weights[parent, child]).ravel()
+    own = entries_at(posterior.weights, parent, child)
     prior = posterior.strength * posterior.base.probability(parent, child)
     foretold: Floats = (own + prior) / (births + posterior.strength)
     return foretold

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from nichechain import Archive, NicheChain, build, load
+from nichechain import Archive, NicheChain, build, l_evolvability, load
 from nichechain.archive.building import BuildProgress
 from nichechain.core.errors import ArchiveError, NichechainError
 from nichechain.domains import FetchPickAndPlace, PlanarArm
@@ -84,7 +84,7 @@ def test_niches_without_an_elite(arm: Archive) -> None:
 @pytest.mark.parametrize(
     ("niche", "message"),
     [
-        (30, "niche is 30, but the grid has niches 0 to 29"),
+        (31, "niche is 31, but the grid has niches 0 to 29"),
         (-1, "niche is -1"),
         ((6, 0), "this grid runs from 0,0 to 5,4"),
         ((0, -1), "this grid runs from"),
@@ -244,3 +244,19 @@ def test_an_archive_is_its_last_commit(tmp_path: Path) -> None:
         build(replace(ARM, evaluations=90), tmp_path, executor)
     assert first.meta.births == 60
     assert load(tmp_path).meta.births == len(load(tmp_path).births()) == 90
+
+
+def test_the_outside_state_can_be_asked():
+    """Its elite, its row and its l-evolvability (spec 1.2)."""
+    archive = load("fetch-pick-and-place")
+    elite = archive.elite("outside")
+    assert elite.state == 400
+    assert elite.niche is None
+    assert elite.uid == archive.elite(400).uid == int(archive.elites.uid[-1])
+    assert int(archive.births().set_index("uid").loc[elite.uid, "child_niche"]) == 400
+    chain = archive.chain(estimator="mle", unvisited="self")
+    value = l_evolvability(chain, niche="outside", l=1, lineages=1).value
+    row = chain.T[[400]].toarray()[0]
+    assert value == pytest.approx(row[:400].sum(), abs=1e-12)
+    with pytest.raises(NichechainError, match="'elsewhere', but must be an index, a number, or 'outside'"):
+        archive.elite("elsewhere")

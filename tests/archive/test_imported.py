@@ -149,3 +149,41 @@ def test_names_of_axes_are_as_many_as_axes(tmp_path):
     log = written(pd.DataFrame(GOOD), tmp_path / "log.csv")
     with pytest.raises(NichechainError, match="axes are x, y, z, but the grid has 2"):
         import_births(log, tmp_path / "in", GRID, axes=Axes(("x", "y", "z")))
+
+
+@pytest.mark.parametrize(
+    ("columns", "how", "said"),
+    [
+        ({"x0": [0.1, np.nan], "y0": [0.1, 0.2]}, {}, "row 2 has only some of x0, y0: give all or none"),
+        ({"run": [1.0, np.nan]}, {"run": "run"}, "row 2 has no run"),
+        ({"run": [[1], [2]]}, {"run": "run"}, "column 'run' has values of type list"),
+        ({"run": [{"a": 1}, {"a": 2}]}, {"run": "run"}, "column 'run' has values of type struct"),
+        ({"uid": np.array([1, 2**64 - 1], np.uint64)}, {"uid": "uid"}, "less than 2\\*\\*63"),
+        (
+            {"uid": [1.0, 1e300]},
+            {"uid": "uid"},
+            r"row 2 has uid 1e\+300, but must have a whole",
+        ),
+    ],
+)
+def test_what_stands_in_a_column_is_said(tmp_path, columns, how, said):
+    frame = pd.DataFrame({"x0": [0.1, 0.2], "y0": [0.1, 0.2], "child": [3, 4], **columns})
+    log = written(frame, tmp_path / "log.parquet")
+    with pytest.raises(NichechainError, match=said):
+        import_births(log, tmp_path / "a", GRID, columns=Columns(parent=("x0", "y0"), child="child", **how))
+
+
+def test_a_column_that_is_there_twice(tmp_path):
+    (tmp_path / "log.csv").write_text("parent,child,child\n1,3,0\n2,4,1\n")
+    with pytest.raises(NichechainError, match="column 'child' more than once"):
+        import_births(tmp_path / "log.csv", tmp_path / "a", GRID, columns=Columns("parent", "child"))
+
+
+def test_as_many_runs_as_births(tmp_path):
+    """Numbers within runs are made in one go, and runs are numbered in the order of their names."""
+    names = np.random.default_rng(0).permutation(50_000).astype(str)
+    log = written(pd.DataFrame({"parent": 1, "child": 2, "run": names}), tmp_path / "log.parquet")
+    import_births(log, tmp_path / "a", GRID, columns=Columns("parent", "child", run="run"))
+    births = nc.load(tmp_path / "a").births()
+    assert births.run.tolist() == np.argsort(np.argsort(names)).tolist()
+    assert births.uid.eq(0).all()

@@ -117,8 +117,9 @@ def test_outside_is_a_state_but_no_niche():
     assert [chain.label(state) for state in range(3)] == ["0", "1", "outside"]
     assert chain.niche_evolvability(l=2, lineages=5).shape == (2,)
     assert repr(chain) == "NicheChain(2 niches and outside, estimator: given)"
+    assert chain.state("outside") == chain.state(2) == 2
     with pytest.raises(NichechainError, match="niches 0 to 1"):
-        chain.state(2)
+        chain.state(3)
 
 
 @pytest.mark.parametrize("niche", [-1, 3, 1000])
@@ -141,7 +142,8 @@ def test_a_grid_names_the_states():
     chain = NicheChain(np.eye(7), niches=niches, outside=6)
     assert chain.state((2, 1)) == chain.state(5) == 5
     assert [chain.label(state) for state in (0, 5, 6)] == ["0,0", "2,1", "outside"]
-    for niche in ((3, 0), (0, 2), (-1, 0), (0,), 6, -1):
+    assert chain.state("outside") == chain.state(6) == 6
+    for niche in ((3, 0), (0, 2), (-1, 0), (0,), 7, -1, "inside"):
         with pytest.raises(NichechainError, match="niche is"):
             chain.state(niche)
 

@@ -29,9 +29,7 @@ from .table import (
     whole,
 )
 
-_BAD_NICHE = (-1, 6, (9, 9), (0,), "0,0", 1.5)
-# The outside state goes by its number, 6.
-_NOWHERE = (-1, 7, (9, 9), (0,), "0,0", 1.5)
+_BAD_NICHE = (-1, 7, (9, 9), (0,), "0,0", 1.5)
 _OTHER = GridNiches((3, 2), ((0.0, 3.0), (0.0, 1.0)))
 _THRESHOLD = (-0.1, 1.0, 1.5, *NOT_A_NUMBER)
 _SHARES = ([1.0], [0.5, 0.6, 0, 0, 0, 0], [-1.0, 2.0, 0, 0, 0, 0], [np.nan] * 6, *RAGGED)
@@ -124,17 +122,17 @@ CALLS = (
     Call(
         "chain.structure.passage.hitting_probabilities",
         lambda w: {"chain": w.estimated, "target": 0},
-        {"target": (*_NOWHERE, [], [0, 99], None)},
+        {"target": (*_BAD_NICHE, [], [0, 99], None)},
     ),
     Call(
         "chain.structure.passage.mean_first_passage_times",
         lambda w: {"chain": w.estimated, "target": 0},
-        {"target": (*_NOWHERE, [], [0, 99], None)},
+        {"target": (*_BAD_NICHE, [], [0, 99], None)},
     ),
     Call(
         "chain.structure.passage.quasi_stationary_distribution",
         lambda w: {"chain": w.estimated, "states": [0, 1]},
-        {"states": (*_NOWHERE, [], [0, 99])},
+        {"states": (*_BAD_NICHE, [], [0, 99])},
     ),
     _at(
         "evolvability.where_to_sample.where_to_sample",

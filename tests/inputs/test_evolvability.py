@@ -22,7 +22,7 @@ from .table import (
     whole,
 )
 
-_BAD_NICHE = (-1, 6, (9, 9), (0,), "0,0", 1.5, None)
+_BAD_NICHE = (-1, 7, (9, 9), (0,), "0,0", 1.5, None)
 _SHARES = ([1.0], [0.5, 0.6, 0, 0, 0, 0], [-1.0, 2.0, 0, 0, 0, 0], [np.nan] * 6, *RAGGED)
 _ASKED = {"method": UNKNOWN, "convention": UNKNOWN, "repeats": whole(0), "draws": whole(0), **LINEAGES}
 

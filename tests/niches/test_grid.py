@@ -237,3 +237,25 @@ def test_parse_niche(text, niche):
 def test_parse_niche_refuses_and_names_the_option(text):
     with pytest.raises(NichechainError, match="--elite is"):
         parse_niche(text, "--elite")
+
+
+CORNERS = [[1.55, 1.1], [1.05, 0.4]]
+
+
+def test_a_bound_in_float32_is_on_the_bound():
+    """As pyribs has it, whose archives are float32 where behaviors are."""
+    from ribs.archives import GridArchive
+
+    grid = GridNiches((20, 20), ((1.05, 1.55), (0.4, 1.1)))
+    short = np.array(CORNERS, np.float32)
+    peer = GridArchive(solution_dim=1, dims=grid.shape, ranges=grid.bounds, dtype=np.float32)
+    assert grid.of(short).tolist() == [399, 0] == peer.index_of(short).tolist()
+    beyond = np.nextafter(short, np.float32([[9, 9], [-9, -9]]))
+    assert grid.of(beyond).tolist() == [400, 400]
+
+
+def test_float64_is_compared_as_it_is():
+    grid = GridNiches((20, 20), ((1.05, 1.55), (0.4, 1.1)))
+    assert grid.of(CORNERS).tolist() == [399, 0]
+    # In float32, 1.1 is larger than it is, and 1.05 smaller.
+    assert grid.of(np.array(CORNERS, np.float32).astype(np.float64)).tolist() == [400, 400]

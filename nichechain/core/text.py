@@ -1,0 +1,28 @@
+"""Texts of others, made safe to show."""
+
+from __future__ import annotations
+
+from typing import Any
+
+
+def printable(text: str) -> str:
+    """The text with escapes in place of what does not print.
+
+    A terminal obeys some of that: whoever forges an archive could write over what stands on it.
+    """
+    if text.isprintable():
+        return text
+    return "".join(c if c.isprintable() or c == "\n" else c.encode("unicode_escape").decode() for c in text)
+
+
+def printable_values(values: Any) -> Any:
+    """The same of every text in a JSON value, keys included."""
+    match values:
+        case str():
+            return printable(values)
+        case list():
+            return [printable_values(value) for value in values]
+        case dict():
+            return {printable(name): printable_values(value) for name, value in values.items()}
+        case _:
+            return values
