@@ -6,8 +6,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from nichechain.births.joins import across_runs
-from nichechain.births.table import LINEAGE, NONE, check_columns
+from nichechain.births.table import LINEAGE, check_columns
 from nichechain.chain.counts import TransitionCounts
 from nichechain.core.errors import NichechainError
 from nichechain.niches import Niches
@@ -67,12 +66,7 @@ def counts_of(
         check_columns(births, LINEAGE)
         flag = births[LINEAGE].fill_null(False)
         births = births.filter(flag if lineages else pc.invert(flag))
-    parent, child, elite, number = (
-        births[name].fill_null(NONE).to_numpy().astype(np.int64)
-        for name in ("parent_niche", "child_niche", "parent_uid", "run")
-    )
-    (elite,) = across_runs(number, elite)
-    return TransitionCounts.from_births(parent, child, niches, elite=elite)
+    return TransitionCounts.from_births(births, niches)
 
 
 def _run(births: pa.Table, run: int) -> int:
