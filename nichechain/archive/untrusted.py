@@ -191,8 +191,8 @@ def read_table(
         if size > _SLACK + (LONGEST_STRING if name in texts else _NUMBER) * rows:
             raise ValueError(f"its column {name} claims to be larger than it can be")
     # See nichechain.core.parquet on threads.
-    table = file.read(columns, use_threads=False)
-    table = file.read(columns if columns is None else [name for name in columns if name in schema.names])
+    wanted = columns if columns is None else [name for name in columns if name in schema.names]
+    table = file.read(wanted, use_threads=False)
     if len(table) != rows:
         raise ValueError(f"it has {len(table)} rows, but {rows} were written")
     for name in texts:
