@@ -1,4 +1,4 @@
-"""Counts of some of the births only: of one run, of a window of steps, of those that were accepted."""
+"""Counts of some of the births only: of one run, a window of steps, those accepted, those of lineages."""
 
 from __future__ import annotations
 
@@ -6,8 +6,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from nichechain.births.joins import across_runs
-from nichechain.births.table import NONE, check_columns
+from nichechain.births.table import LINEAGE, check_columns
 from nichechain.chain.counts import TransitionCounts
 from nichechain.core.errors import NichechainError
 from nichechain.niches import Niches
@@ -20,6 +19,7 @@ def counts_of(
     run: int | None = None,
     steps: tuple[int, int] | None = None,
     accepted: bool = False,
+    lineages: bool | None = None,
 ) -> TransitionCounts:
     """Counts of births.
 
@@ -36,6 +36,8 @@ def counts_of(
     accepted : bool
         Only births that became the elite of their niche. Their T is that of the children that a
         search kept, not of all that parents have.
+    lineages : bool, optional
+        Only births whose parent is the latest of an unselected lineage, or only all others.
 
     Returns
     -------
@@ -60,12 +62,11 @@ def counts_of(
         births = births.filter(pc.and_(pc.greater_equal(step, first), pc.less(step, end)))
     if accepted:
         births = births.filter(_said(births, "accepted", "whether they were accepted"))
-    parent, child, elite, number = (
-        births[name].fill_null(NONE).to_numpy().astype(np.int64)
-        for name in ("parent_niche", "child_niche", "parent_uid", "run")
-    )
-    (elite,) = across_runs(number, elite)
-    return TransitionCounts.from_births(parent, child, niches, elite=elite)
+    if lineages is not None:
+        check_columns(births, LINEAGE)
+        flag = births[LINEAGE].fill_null(False)
+        births = births.filter(flag if lineages else pc.invert(flag))
+    return TransitionCounts.from_births(births, niches)
 
 
 def _run(births: pa.Table, run: int) -> int:
