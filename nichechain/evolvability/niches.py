@@ -73,6 +73,9 @@ def l_evolvability(
 
     Notes
     -----
+    The interval tells what births leave open of T. It is not that of one elite of the niche, which has
+    a distribution of its own: see :func:`nichechain.evolvability.genotype_evolvability`.
+
     Source: the paper's section "Towards better evolvability definitions".
     """
     question = Question(l, lineages, convention, method, repeats, draws, seed)
