@@ -6,6 +6,7 @@ import ast
 import importlib
 import pkgutil
 import re
+import tomllib
 from collections import defaultdict
 from collections.abc import Iterator
 from pathlib import Path
@@ -16,10 +17,12 @@ import nichechain
 
 PACKAGE = Path(nichechain.__file__).parent
 ROOT = PACKAGE.parent
+PAGES = [*ROOT.glob("*.md"), *sorted((ROOT / "docs").rglob("*.md"))]
 PACKAGES = [
     "nichechain",
     *(info.name for info in pkgutil.walk_packages(nichechain.__path__, "nichechain.") if info.ispkg),
 ]
+_PATH = re.compile(r"(?<![\w/.-])(?:tests|nichechain|benchmarks|examples|docs)/[\w./-]+\.(?:py|md|png|svg)")
 _BLOCK = re.compile(r"^ *```python[^\n]*\n(.*?)^ *```$", re.DOTALL | re.MULTILINE)
 
 
@@ -57,7 +60,7 @@ def _imports(code: str) -> Iterator[tuple[str, str]]:
 def _shown() -> list[tuple[str, str]]:
     """The code that users are shown: examples, and blocks of the documentation."""
     found = [(path.name, path.read_text(encoding="utf-8")) for path in sorted(ROOT.glob("examples/*.py"))]
-    for path in (ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))):
+    for path in PAGES:
         blocks = _BLOCK.findall(path.read_text(encoding="utf-8"))
         found += [(path.name, block) for block in blocks if "\n--8<--" not in f"\n{block}"]
     return found
@@ -73,3 +76,20 @@ def test_what_users_are_shown_is_for_users() -> None:
             if not public:
                 private.append(f"{page}: {module} {name}".strip())
     assert not private, "\n".join(private)
+
+
+def test_files_that_pages_name_are_there() -> None:
+    named = {(page.name, path) for page in PAGES for path in _PATH.findall(page.read_text(encoding="utf-8"))}
+    assert len(named) > 20
+    # NAME stands for what a contributor adds.
+    assert not [
+        (page, path) for page, path in sorted(named) if "NAME" not in path and not (ROOT / path).exists()
+    ]
+
+
+def test_the_picture_of_the_architecture_has_every_room() -> None:
+    picture = (ROOT / "docs/pictures/architecture.svg").read_text(encoding="utf-8")
+    rooms = {path.parent.name for path in PACKAGE.glob("*/__init__.py")}
+    assert set(re.findall(r'font-weight="bold" fill="#111">(\w+)<', picture)) == rooms
+    contract = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    assert set(contract["tool"]["importlinter"]["contracts"][0]["layers"]) == rooms

@@ -17,12 +17,8 @@ from pathlib import Path
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
 
-# The command line has a page of its own.
+# The command line has a page of its own, and shipped archives are no room.
 _NOT_PYTHON = ("cli", "archives")
-_GROUPS = {
-    "illumination": ("config", "building", "illumination", "selection", "births"),
-    "archive": ("archive", "store", "committed", "merging", "importing", "exports"),
-}
 _SUBCOMMAND = re.compile(r"^  ([a-z]+) [A-Z]+ ", re.MULTILINE)
 
 
@@ -80,48 +76,35 @@ def examples(root: Path) -> dict[str, str]:
 
 
 def reference(package: Path) -> dict[str, str]:
-    """One page for each package, and one for each group of the modules beside them."""
-    beside = {path.stem for path in package.glob("*.py")} - {"__init__", "__main__"}
-    pages = {}
-    for folder in sorted(path.parent for path in package.glob("*/__init__.py")):
-        if folder.name in _NOT_PYTHON:
-            continue
-        name = f"nichechain.{folder.name}"
-        inner = [path for path in sorted(folder.rglob("*.py")) if path.stem[0] != "_" and _has_public(path)]
-        pages[f"api/{folder.name}.md"] = _package(
-            package.parent, name, _exported(folder / "__init__.py"), inner
-        )
-    for group, names in _GROUPS.items():
-        listed = [name for name in names if name in beside]
-        beside -= set(listed)
-        pages[f"api/{group}.md"] = _modules(group, listed)
-    pages["api/others.md"] = _modules(
-        "others", sorted(name for name in beside if _has_public(package / f"{name}.py"))
-    )
-    pages["api/nichechain.md"] = _front(_exported(package / "__init__.py"))
+    """One page for each room, of what its packages have for users, and one of what comes in one import."""
+    pages = {"api/nichechain.md": _front(_exported(package / "__init__.py"))}
+    for room in sorted(path.parent for path in package.glob("*/__init__.py")):
+        if room.name not in _NOT_PYTHON:
+            packages = sorted(room.rglob("__init__.py"), key=lambda path: (len(path.parts), path))
+            parts: list[str] = []
+            seen: set[str] = set()
+            for path in packages:
+                names = [name for name in _exported(path) if name not in seen]
+                seen.update(names)
+                parts += _package(package.parent, path.parent, names) if names else []
+            pages[f"api/{room.name}.md"] = "\n\n".join([f"# nichechain.{room.name}", *parts])
     return pages
 
 
-def _package(root: Path, name: str, exported: list[str], modules: list[Path]) -> str:
-    lines = [
-        f"# {name}",
-        f"::: {name}\n    options:\n      members: false\n      show_root_heading: false\n"
+def _package(root: Path, folder: Path, exported: list[str]) -> list[str]:
+    """What a package says of itself, the line that imports what it has, and a description of each name."""
+    package = ".".join(folder.relative_to(root).parts)
+    inner = [] if package.count(".") == 1 else [f"## {package}"]
+    names = "\n".join(f"    {each}," for each in exported)
+    # A function may bear the name of its module.
+    homes = [f"{package}.{each}" if (folder / f"{each}.py").is_file() else package for each in exported]
+    return [
+        *inner,
+        f"::: {package}\n    options:\n      members: false\n      show_root_heading: false\n"
         "      show_root_toc_entry: false",
+        f"```python\nfrom {package} import (\n{names}\n)\n```",
+        *(f"::: {home}.{each}" for home, each in zip(homes, exported, strict=True)),
     ]
-    if exported:
-        names = "\n".join(f"    {each}," for each in exported)
-        lines.append(f"```python\nfrom {name} import (\n{names}\n)\n```")
-    for path in modules:
-        module = ".".join(path.relative_to(root).with_suffix("").parts)
-        # What a package names is for its users; the rest of that module is how it is done.
-        shown = [each for each in exported if each in _defined(path)]
-        options = f"\n    options:\n      members: {shown}" if shown else ""
-        lines.append(f"::: {module}{options}")
-    return "\n\n".join(lines)
-
-
-def _modules(title: str, names: list[str]) -> str:
-    return "\n\n".join([f"# {title}", *(f"::: nichechain.{name}" for name in names)])
 
 
 def _front(exported: list[str]) -> str:
@@ -132,7 +115,7 @@ def _front(exported: list[str]) -> str:
     return (
         "# nichechain\n\n::: nichechain\n    options:\n      members: false\n"
         "      show_root_heading: false\n\n```python\nimport nichechain as nc\n```\n\n"
-        f"What that gives, each described with the module that it comes from:\n\n{names}\n"
+        f"What that gives, each described with the room that it comes from:\n\n{names}\n"
     )
 
 
@@ -142,26 +125,6 @@ def _exported(path: Path) -> list[str]:
         if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "__all__":
             return [str(name) for name in ast.literal_eval(node.value)]
     return []
-
-
-def _defined(path: Path) -> set[str]:
-    """Names that the module gives to something of its own."""
-    names = set()
-    for node in ast.parse(path.read_text(encoding="utf-8")).body:
-        if isinstance(node, (ast.ClassDef, ast.FunctionDef)):
-            names.add(node.name)
-        elif isinstance(node, (ast.Assign, ast.AnnAssign)):
-            target = node.targets[0] if isinstance(node, ast.Assign) else node.target
-            names.add(ast.unparse(target))
-    return names
-
-
-def _has_public(path: Path) -> bool:
-    """Whether the module defines a class or function that is not private."""
-    return any(
-        isinstance(node, (ast.ClassDef, ast.FunctionDef)) and not node.name.startswith("_")
-        for node in ast.parse(path.read_text(encoding="utf-8")).body
-    )
 
 
 def _help(words: list[str]) -> str:
