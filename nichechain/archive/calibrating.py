@@ -104,7 +104,7 @@ def _check_asked(rollouts: int | None, resume: bool) -> None:
     if rollouts is None:
         if not resume:
             raise NichechainError(
-                "rollouts is not given: say how many births to add, or resume what was begun"
+                "rollouts is not given, but must be a number of births, unless what was begun is resumed"
             )
         return
     if resume:

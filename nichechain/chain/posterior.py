@@ -100,8 +100,7 @@ class DirichletPosterior:
         Dirichlet(s B), though not the higher moments, and T is a :class:`PooledTransition`.
         """
         if self.prior is not None:
-            base, strength = self.prior.draw(rng)
-            return replace(self, base=base, strength=strength, prior=None).draw(rng)
+            return self.settled(rng).draw(rng)
         matrix = self.weights.tocoo()
         rows, columns = matrix.coords
         births = self.counts.births / self.design_effect
@@ -129,9 +128,12 @@ class DirichletPosterior:
         index = np.concatenate([rows, parents]), np.concatenate([columns, landed])
         return _collected(*self._absorbed(data, index), states)
 
-    def settled(self, rng: np.random.Generator) -> DirichletPosterior:  # noqa: ARG002
+    def settled(self, rng: np.random.Generator) -> DirichletPosterior:
         """The same under one draw of base and strength, where these are not known either."""
-        return self
+        if self.prior is None:
+            return self
+        base, strength = self.prior.draw(rng)
+        return replace(self, base=base, strength=strength, prior=None)
 
     def _draw_atoms(
         self, known: Floats, observed: tuple[Ints, Ints, Floats], rng: np.random.Generator

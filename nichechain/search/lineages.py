@@ -143,7 +143,8 @@ class Calibration:
         return self.first_uid + self.births
 
     def stretch(self, config: BuildConfig) -> Stretch:
-        """Its steps: as many lineages side by side as a batch has births, fewer for few births."""
+        """Its steps: at most a batch of lineages side by side, and none cut short that need not be."""
         length = config.lineage_length
-        batch = min(config.batch, ceil(self.births / length))
+        lineages = ceil(self.births / length)
+        batch = ceil(lineages / ceil(lineages / config.batch))
         return Stretch(self.first_step, self.first_uid, batch, 1.0, length)

@@ -72,12 +72,12 @@ def test_births_are_added_and_none_is_changed(pristine: Path, more: Path) -> Non
 def test_all_are_of_lineages_that_begin_at_elites(more: Path) -> None:
     births = nc.load(more).births()
     new = births[450:]
-    # 64 lineages side by side, for 6 steps each: 15 whole steps and 40 births.
+    # 167 lineages, 56 of them side by side, for 6 steps each: 17 whole steps and 48 births.
     generation = (new["step"] - new["step"].min()) % 6
-    assert new.groupby("step").size().tolist() == [64] * 15 + [40]
+    assert new.groupby("step").size().tolist() == [56] * 17 + [48]
     pd.testing.assert_series_equal(new["lineage"], generation > 0, check_names=False, check_dtype=False)
     following = new[new["lineage"]]
-    assert (following["parent_uid"] == following["uid"] - 64).all()
+    assert (following["parent_uid"] == following["uid"] - 56).all()
     elites: dict[int, int] = {}
     for step, rows in births.groupby("step"):
         if step >= new["step"].min():
@@ -157,7 +157,7 @@ def test_an_interrupted_one_goes_on_to_the_same_bits(
     with pytest.raises(KeyboardInterrupt):
         nc.calibrate(folder, 1000, Stopping(call, after))
     kept = nc.load(folder).meta
-    assert kept.births == 450 + 64 * (call - 1)
+    assert kept.births == 450 + 56 * (call - 1)
     with Threads(1) as executor:
         if call == 1:
             # There was nothing to keep, so the archive is as it was.
@@ -165,7 +165,7 @@ def test_an_interrupted_one_goes_on_to_the_same_bits(
             nc.calibrate(folder, 1000, executor)
         else:
             assert verify(folder, sample=5, executor=executor).ok
-            with pytest.raises(ArchiveError, match=f"lacks {1000 - 64 * (call - 1)} of its 1000 births"):
+            with pytest.raises(ArchiveError, match=f"lacks {1000 - 56 * (call - 1)} of its 1000 births"):
                 nc.calibrate(folder, 7, executor)
             nc.calibrate(folder, executor=executor, resume=True)
         with pytest.raises(ArchiveError, match="no calibration to go on with"):

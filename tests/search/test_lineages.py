@@ -170,7 +170,7 @@ def test_lineages_are_found_and_replaced_by_slot() -> None:
 
 
 @pytest.mark.parametrize(
-    ("asked", "slots"), [(1, 1), (9, 2), (5, 1), (6, 2), (235, 47), (236, 47), (9999, 47)]
+    ("asked", "slots"), [(1, 1), (9, 2), (5, 1), (6, 2), (235, 47), (236, 24), (9999, 47)]
 )
 def test_a_calibration_runs_whole_lineages_side_by_side(asked: int, slots: int) -> None:
     stretch = Calibration(7, 100, asked).stretch(CONFIG)
