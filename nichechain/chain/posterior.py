@@ -12,6 +12,7 @@ from scipy import sparse
 
 from nichechain.chain.base_measure import BaseMeasure
 from nichechain.chain.counts import TransitionCounts
+from nichechain.chain.elites import elite_concentration
 from nichechain.chain.operator import PooledTransition
 from nichechain.chain.prior import FittedPrior
 
@@ -58,6 +59,15 @@ class DirichletPosterior:
     def weights(self) -> sparse.csr_array:
         """C_ij / e_i: births of each row as independent ones, (S, S)."""
         return (sparse.diags_array(1.0 / self.design_effect) @ self.counts.matrix).tocsr()
+
+    @cached_property
+    def elite_concentration(self) -> float:
+        """How many children of an elite its niche's row is worth to what is known of that elite.
+
+        See :func:`nichechain.chain.elites.elite_concentration`; s where births cannot say.
+        """
+        fitted = elite_concentration(self.counts, self.base.probability, self.strength, self.design_effect)
+        return self.strength if fitted is None else fitted
 
     @property
     def absorbing(self) -> bool:
