@@ -74,7 +74,7 @@ def test_table_stands_with_what_it_rests_on(built, capsys):
         (["--l", "0"], "l is 0"),
         (["--lineages", "0"], "lineages is 0"),
         (["--niche", "8,0"], "niche is 8,0, but this grid runs from 0,0 to 7,7"),
-        (["--niche", "64"], "niche is 64, but the grid has niches 0 to 63"),
+        (["--niche", "65"], "niche is 65, but the grid has niches 0 to 63"),
         (["--niche", "a,b"], "--niche is 'a,b'"),
         (["--niche", "1,2,3"], "2 indices"),
         (["--niche", "1,2", "--top", "3"], "--niche and --top exclude each other"),
