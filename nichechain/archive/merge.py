@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
 from nichechain.archive import read, write
-from nichechain.births.table import Offspring
+from nichechain.births.table import NONE
 from nichechain.core.errors import ArchiveError, NichechainError
 from nichechain.core.files import writing
 from nichechain.niches import Niches
@@ -43,14 +44,14 @@ def merge(folders: Sequence[str | Path], out: str | Path) -> None:
 
     Births are put one after the other, runs and births numbered on, so that counts add. The elite of
     a niche is the birth with the largest key, as if one search had met them all; the birth
-    of the earlier run stays where keys are equal. What was pending is dropped: no build goes on
-    with the result.
+    of the earlier run stays where keys are equal. What was pending and lineages under way are
+    dropped: no build goes on with the result.
 
     Parameters
     ----------
     folders : sequence of paths
         At least two archives of the same domain, niches, mutation and replacement. They may be
-        merged themselves.
+        merged themselves, or calibrated.
     out : path
         Where the result goes; it must not hold an archive.
 
@@ -64,7 +65,8 @@ def merge(folders: Sequence[str | Path], out: str | Path) -> None:
     Notes
     -----
     ``meta.origin["runs"]`` has, for every run of the result, its configuration, its number of
-    births and the uid of its first: the uid that a birth had in its own run is what lies above.
+    births and the uid of its first: the uid that a birth had in its own run is what lies above. Of a
+    run that was calibrated it tells which births that added, by their uids in the run.
     """
     paths, out = [Path(folder) for folder in folders], Path(out)
     if len(paths) < 2:
@@ -75,19 +77,26 @@ def merge(folders: Sequence[str | Path], out: str | Path) -> None:
     # Checked before anything is read at length.
     if read.is_archive(out):
         raise ArchiveError(f"{out} already holds an archive: merge into another folder")
-    tables, elites = [], []
+    tables: list[pa.Table] = []
+    elites: list[Elites] = []
     first_run = first_uid = 0
     for path, meta in zip(paths, metas, strict=True):
-        tables.append(_renumbered(read.read_births(path, meta), first_run, first_uid))
+        births = read.read_births(path, meta)
+        _check_ancestry(path, births)
+        tables.append(_renumbered(births, first_run, first_uid))
         own = read.read_state(path, meta).elites
+        if elites and own.genotype.shape[1] != elites[0].genotype.shape[1]:
+            raise NichechainError(
+                f"{paths[0]} has genotypes of {elites[0].genotype.shape[1]} parameters and {path} has "
+                f"{own.genotype.shape[1]}, but must have the same"
+            )
         elites.append(replace(own, uid=own.uid + first_uid))
         first_run += len(meta.origin["runs"]) if meta.origin is not None else 1
         first_uid += meta.births
     births = pa.concat_tables(tables)
     config = replace(metas[0].config, evaluations=len(births))
-    pending = Offspring.none(elites[0].genotype.shape[1])
     step = max(meta.step for meta in metas)
-    state = SearchState(Elites.concatenate(elites).winners(), pending, len(births), step)
+    state = SearchState.at_rest(Elites.concatenate(elites).winners(), len(births), step)
     with writing(out):
         if read.is_archive(out):
             raise ArchiveError(f"{out} already holds an archive: merge into another folder")
@@ -117,6 +126,8 @@ def _runs(paths: list[Path], metas: list[read.Meta]) -> list[dict[str, Any]]:
             own: list[dict[str, Any]] = [
                 {"config": meta.config.to_json(), "births": meta.births, "first_uid": 0}
             ]
+            if meta.calibrations:
+                own[0]["calibrations"] = [asdict(each) for each in meta.calibrations]
         else:
             own = meta.origin["runs"]
         for run in own:
@@ -146,6 +157,18 @@ def _same_search(first: dict[str, Any], second: dict[str, Any]) -> bool:
     # What an earlier version stored lacks the values that came later, and has lists for tuples.
     ours, theirs = BuildConfig.from_json(first), BuildConfig.from_json(second)
     return replace(ours, evaluations=theirs.evaluations) == theirs
+
+
+def _check_ancestry(path: Path, births: pa.Table) -> None:
+    """Refuse numbers given twice and parents that are no earlier births: no search leaves them behind."""
+    uid = births["uid"].fill_null(NONE).to_numpy()
+    run = births["run"].fill_null(NONE).to_numpy()
+    parent = births["parent_uid"].fill_null(NONE).to_numpy()
+    if (uid != np.arange(uid.size)).any():
+        raise ArchiveError(f"{path} does not number its births from 0, each once: verification says which")
+    born = parent != NONE
+    if (born & ((parent < 0) | (parent >= uid))).any() or (run[parent[born]] != run[born]).any():
+        raise ArchiveError(f"{path} has births whose parents are no earlier births: verification says which")
 
 
 def _renumbered(births: pa.Table, first_run: int, first_uid: int) -> pa.Table:

@@ -26,7 +26,7 @@ from nichechain.archive.parquet_pages import decoded_size
 from nichechain.core.text import printable
 
 LONGEST_STRING = 1000
-"""Bytes of the longest string in a table that is believed."""
+"""Bytes of the longest string in a table, or characters in metadata, that is believed."""
 
 _SLACK = 1 << 20
 _NUMBER = 64
@@ -77,10 +77,30 @@ def read_object(content: bytes) -> dict[str, Any]:
     values = json.loads(content.decode("utf-8"))
     if not isinstance(values, dict):
         raise ValueError("it holds no object")
+    longest = _longest(values)
+    if longest > LONGEST_STRING:
+        raise ValueError(f"it has a text of {longest} characters, more than {LONGEST_STRING}")
     return values
 
 
-def read_arrays(content: bytes, kinds: Mapping[str, tuple[DTypeLike, int]]) -> dict[str, NDArray[Any]]:
+def _longest(values: Any) -> int:
+    """Characters of the longest text in a JSON value, keys included."""
+    match values:
+        case str():
+            return len(values)
+        case list():
+            return max(map(_longest, values), default=0)
+        case dict():
+            return max((max(len(name), _longest(value)) for name, value in values.items()), default=0)
+        case _:
+            return 0
+
+
+def read_arrays(
+    content: bytes,
+    kinds: Mapping[str, tuple[DTypeLike, int]],
+    optional: Mapping[str, tuple[DTypeLike, int]],
+) -> dict[str, NDArray[Any]]:
     """Arrays of an ``.npz`` file as ``numpy.savez`` writes it: uncompressed, never pickled.
 
     Parameters
@@ -88,6 +108,8 @@ def read_arrays(content: bytes, kinds: Mapping[str, tuple[DTypeLike, int]]) -> d
     content : bytes
     kinds : mapping of str to (dtype, int)
         Type and number of dimensions of each array that is wanted.
+    optional : mapping of str to (dtype, int)
+        The same of arrays that are wanted where they are there: all of them, or none is.
     """
     with zipfile.ZipFile(io.BytesIO(content)) as archive:
         members = archive.infolist()
@@ -96,6 +118,7 @@ def read_arrays(content: bytes, kinds: Mapping[str, tuple[DTypeLike, int]]) -> d
         if sum(member.file_size for member in members) > len(content):
             raise ValueError("it claims to hold more than it does")
         names = [member.filename for member in members]
+        kinds = {**kinds, **(optional if any(f"{name}.npy" in names for name in optional) else {})}
         for name in kinds:
             if names.count(f"{name}.npy") != 1:
                 raise ValueError(f"it should hold {name} once")
@@ -126,7 +149,9 @@ def read_array(content: bytes, dtype: DTypeLike, dimensions: int) -> NDArray[Any
     return flat.reshape(shape, order="F" if fortran else "C").copy(order="K")
 
 
-def read_table(content: bytes, schema: pa.Schema, rows: int, columns: list[str] | None = None) -> pa.Table:
+def read_table(
+    content: bytes, schema: pa.Schema, rows: int, columns: list[str] | None = None, *, flag: str
+) -> pa.Table:
     """A Parquet file of that schema and that many rows.
 
     Parameters
@@ -138,17 +163,23 @@ def read_table(content: bytes, schema: pa.Schema, rows: int, columns: list[str] 
         Memory is bounded by a multiple of it.
     columns : list of str, optional
         Those that are wanted; by default all.
+    flag : str
+        The last column, which may be missing where it is false in all rows.
     """
+    flagged = schema
     texts = [field.name for field in schema if pa.types.is_string(field.type)]
     file = pq.ParquetFile(
         pa.BufferReader(content),
         # A string may be stored once and named in every row, so rows are only spelled out when
         # the longest is known.
         read_dictionary=texts,
+        pre_buffer=False,
         thrift_string_size_limit=_THRIFT,
         thrift_container_size_limit=_THRIFT,
     )
     meta = file.metadata
+    if flag not in meta.schema.to_arrow_schema().names:
+        schema = schema.remove(schema.get_field_index(flag))
     if not meta.schema.to_arrow_schema().remove_metadata().equals(schema):
         raise ValueError("its columns are not those of births")
     groups = [meta.row_group(group) for group in range(meta.num_row_groups)]
@@ -159,7 +190,9 @@ def read_table(content: bytes, schema: pa.Schema, rows: int, columns: list[str] 
         size = sum(decoded_size(content, group.column(index)) for group in groups)
         if size > _SLACK + (LONGEST_STRING if name in texts else _NUMBER) * rows:
             raise ValueError(f"its column {name} claims to be larger than it can be")
-    table = file.read(columns)
+    # See nichechain.core.parquet on threads.
+    wanted = columns if columns is None else [name for name in columns if name in schema.names]
+    table = file.read(wanted, use_threads=False)
     if len(table) != rows:
         raise ValueError(f"it has {len(table)} rows, but {rows} were written")
     for name in texts:
@@ -167,7 +200,9 @@ def read_table(content: bytes, schema: pa.Schema, rows: int, columns: list[str] 
             place = table.column_names.index(name)
             table = table.set_column(place, schema.field(name), _spelled_out(table[name]))
     table.validate(full=True)
-    return table
+    if flag not in table.column_names and (columns is None or flag in columns):
+        table = table.append_column(flagged.field(flag), pa.array(np.zeros(rows, bool)))
+    return table if columns is None else table.select(columns)
 
 
 def _spelled_out(texts: pa.ChunkedArray) -> pa.ChunkedArray:

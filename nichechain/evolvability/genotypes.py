@@ -66,8 +66,9 @@ def genotype_evolvability(
         D is that row. For l = 1 and U ≤ m, and where only fresh offspring count, rarefaction of them
         instead. ``empirical``: D is the observed share, the paper's letter.
     strength : float, optional
-        α, how many children the row of T is worth in D; by default what the likeness of
-        siblings says, :func:`nichechain.evolvability.record.own_strength`.
+        α, how many children the row of T is worth in D; by default as many as make children of one
+        elite foretell each other best, see :func:`nichechain.chain.elites.elite_concentration`, or
+        1 where T has no posterior.
     chain : NicheChain, optional
         By default ``archive.chain()``.
     executor : Executor, optional

@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from nichechain.births.table import NONE
-from nichechain.chain.empirical_bayes import sibling_correlation
 from nichechain.chain.model import NicheChain
 
 if TYPE_CHECKING:
@@ -17,8 +16,6 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
-
-_STRENGTHS = (1.0, 1e4)
 
 
 def recorded_children(archive: Archive, uids: Ints) -> sparse.csr_array:
@@ -50,17 +47,9 @@ def recorded_children(archive: Archive, uids: Ints) -> sparse.csr_array:
 def own_strength(chain: NicheChain) -> float:
     """α: how many children of an elite its niche's row is worth, in foretelling where the next ones land.
 
-    Notes
-    -----
-    With ρ the likeness of one elite's children
-    (:func:`nichechain.chain.empirical_bayes.sibling_correlation`), α = (1 − ρ)/ρ: what a Dirichlet of
-    strength α + 1 around the row would show between siblings, kept between 1 and 10,000. Where births
-    do not say whose they are, it is what the base measure is worth to the rows; 1 where T is given.
+    :func:`nichechain.chain.elites.elite_concentration` of the chain's births; 1 where T has no posterior.
     """
-    if chain.counts is not None and len(chain.counts.families):
-        likeness = sibling_correlation(chain.counts)
-        return float(np.clip((1.0 - likeness) / max(likeness, 1e-9), *_STRENGTHS))
-    return 1.0 if chain.posterior is None else chain.posterior.strength
+    return 1.0 if chain.posterior is None else chain.posterior.elite_concentration
 
 
 def draw_children(counts: Ints, row: Floats, rng: np.random.Generator, strength: float) -> Floats:

@@ -8,7 +8,6 @@ l-evolvability over niches.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 import pandas as pd
@@ -260,7 +259,11 @@ def _interval(levels: Floats) -> tuple[float, float, float]:
 
 
 def _parts(births: pa.Table, niches: Niches, parts: int) -> tuple[list[TransitionCounts], Ints]:
-    """Counts of equally many births each, in the order of steps, and their first and last step (P, 2)."""
+    """Counts of equally many births each, in the order of steps, and their first and last step (P, 2).
+
+    Births of unselected lineages are shared out alike, in their own order: a calibration adds them all at the
+    end, and parts are to differ by what the search did.
+    """
     check_columns(births, *_COLUMNS)
     missing = births["step"].null_count
     if missing or not len(births):
@@ -268,12 +271,17 @@ def _parts(births: pa.Table, niches: Niches, parts: int) -> tuple[list[Transitio
             f"{missing} of {len(births)} births do not say their step: no early and late ones"
         )
     step = births["step"].to_numpy().astype(np.int64)
-    order = np.argsort(step, kind="stable")
-    births = births.select(list(_COLUMNS)).take(pa.array(order))
-    edges = np.linspace(0, len(births), parts + 1).astype(int)
-    counts = [counts_of(births.slice(start, end - start), niches) for start, end in pairwise(edges)]
-    last = np.maximum(edges[1:] - 1, 0)
-    return counts, np.stack([step[order[np.minimum(edges[:-1], last)]], step[order[last]]], axis=1)
+    flagged = np.zeros(step.size, bool)
+    if "lineage" in births.column_names:
+        flagged = births["lineage"].fill_null(False).to_numpy()
+    part = np.empty(step.size, np.int64)
+    for kind in (flagged, ~flagged):
+        order = np.flatnonzero(kind)[np.argsort(step[kind], kind="stable")]
+        part[order] = np.arange(order.size) * parts // max(1, order.size)
+    counts = [counts_of(births.filter(pa.array(part == number)), niches) for number in range(parts)]
+    inside = [step[~flagged & (part == number)] for number in range(parts)]
+    steps = [(some.min(initial=step.max()), some.max(initial=0)) for some in inside]
+    return counts, np.array(steps)
 
 
 def _observed(counts: list[TransitionCounts], min_births: int) -> Ints:

@@ -59,6 +59,23 @@ def test_births_are_put_in_the_order_of_their_steps():
     assert level_drift(shuffled, GRID, **OPTIONS).early == pytest.approx(exact(2), rel=0.1)
 
 
+def test_births_of_lineages_are_shared_out():
+    """A calibration's wide births, all at the end, are no drift."""
+    search, calibration = births([4], 5), births([8], 6, 600)
+    late = pa.array(np.full(600, 1000, np.int32))
+    calibration = calibration.set_column(calibration.column_names.index("step"), "step", late)
+    flags = [pa.array(np.full(len(table), flag)) for table, flag in ((search, False), (calibration, True))]
+    index = search.column_names.index("lineage")
+    both = [
+        table.set_column(index, "lineage", flag)
+        for table, flag in zip((search, calibration), flags, strict=True)
+    ]
+    found = level_course(pa.concat_tables(both), GRID, parts=2, **OPTIONS)
+    assert found.births.tolist() == [1800, 1800]
+    assert found.last_step.tolist() == [149, 299]
+    assert found.level[0] == pytest.approx(found.level[1], rel=0.05)
+
+
 def test_births_of_one_chain_seldom_disagree():
     """A 90 % interval misses in one of ten archives: P(X > 6) is 1 % for X ~ Binomial(25, 0.1)."""
     missed = [level_drift(births([4], 10 + seed), GRID, **OPTIONS, seed=seed).disagrees for seed in range(25)]

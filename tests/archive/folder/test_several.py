@@ -11,7 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from nichechain.archive import building, read, write
+from nichechain.archive import filling as building
+from nichechain.archive import read, write
 from nichechain.archive.archive import load
 from nichechain.archive.building import build
 from nichechain.core.errors import ArchiveError
@@ -91,7 +92,7 @@ READER = """
 import sys
 from pathlib import Path
 import numpy as np
-from nichechain.archive import building, read, write
+from nichechain.archive import filling as building, read, write
 from nichechain.archive.archive import load
 
 folder, total = Path(sys.argv[1]), int(sys.argv[2])
@@ -144,6 +145,28 @@ def test_readers_see_whole_commits_and_are_never_kept_waiting(
     assert reader.returncode == 0
     assert reads >= commits >= 2
     assert first < config.evaluations
+
+
+def test_reading_begins_no_threads(pristine: dict[str, bytes], tmp_path: Path) -> None:
+    """One that still held Python's bytes when the interpreter ended would abort it."""
+    code = (
+        "import os, sys\n"
+        "from nichechain.archive.archive import load\n"
+        "before = len(os.listdir('/proc/self/task'))\n"
+        "archive = load(sys.argv[1])\n"
+        "archive.births(), archive.counts_of()\n"
+        "print(len(os.listdir('/proc/self/task')) - before)"
+    )
+    if not Path("/proc/self/task").is_dir():
+        pytest.skip("threads are counted where /proc tells them")
+    done = subprocess.run(
+        [sys.executable, "-c", code, str(written(tmp_path, pristine))],
+        capture_output=True,
+        cwd=ROOT,
+        text=True,
+        check=True,
+    )
+    assert done.stdout == "0\n"
 
 
 def test_a_folder_that_is_built_anew_is_no_later_commit(pristine: dict[str, bytes], tmp_path: Path) -> None:
