@@ -2,19 +2,29 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
 from nichechain.births.families import tabulated
+from nichechain.births.joins import across_runs
 from nichechain.births.table import NONE
 from nichechain.core.checks import as_floats, as_whole
 from nichechain.core.errors import NichechainError
 from nichechain.niches import Niches
 
+if TYPE_CHECKING:
+    import pandas as pd
+    import pyarrow as pa
+
 Ints = NDArray[np.int64]
+
+# Beyond this not every whole number is a float64 any more.
+_MOST_BIRTHS = 2.0**53
 
 
 @dataclass(frozen=True)
@@ -41,40 +51,135 @@ class TransitionCounts:
     visits: Ints
     families: Ints = field(default_factory=lambda: np.empty((0, 4), np.int64))
 
+    @overload
+    @classmethod
+    def from_births(
+        cls, parent: pd.DataFrame | pa.Table, child: Niches, *, elite: None = None
+    ) -> TransitionCounts: ...
+
+    @overload
     @classmethod
     def from_births(
         cls, parent: ArrayLike, child: ArrayLike, niches: Niches, *, elite: ArrayLike | None = None
+    ) -> TransitionCounts: ...
+
+    @classmethod
+    def from_births(
+        cls, parent: Any, child: Any, niches: Niches | None = None, *, elite: ArrayLike | None = None
     ) -> TransitionCounts:
-        """Counts of births.
+        """Counts of births: of their columns, or of a table as in ``from_births(births, niches)``.
 
         Parameters
         ----------
         parent, child : (N,) ints
-            States of the parent and of the child, -1 for null: a birth without a parent is only
-            a visit, and one without a niche failed and is left out.
+            States of the parent and of the child, null or -1 where there is none: a birth without a
+            parent is only a visit, and one without a niche failed and is left out. Or, in the place of
+            ``parent``, a DataFrame or pyarrow.Table with the columns of :mod:`nichechain.births.table`,
+            such as ``archive.births()``, and the niches in the place of ``child``.
         niches : Niches
             The niches that the numbers belong to.
         elite : (N,) ints, optional
-            Number of the parent, which tells siblings from cousins; -1 where it is not known.
+            Number of the parent, which tells siblings from cousins; null or -1 where it is not known.
 
         Raises
         ------
         NichechainError
-            If the lengths differ or a state does not exist.
+            If the lengths differ, a state does not exist or a column is missing.
         """
-        i, j = as_whole("parent", parent), as_whole("child", child)
+        if hasattr(parent, "columns"):
+            if not isinstance(child, Niches) or niches is not None or elite is not None:
+                raise NichechainError(
+                    "a table of births comes with its niches alone: from_births(births, niches)"
+                )
+            return cls._from_table(parent, child)
+        if niches is None:
+            raise NichechainError("niches are missing: from_births(parent, child, niches)")
+        i, j = _states("parent", parent), _states("child", child)
         _check_pairs(i, j, niches, lowest=NONE)
         moved = (i != NONE) & (j != NONE)
         counts = cls.from_pairs(i[moved], j[moved], niches)
         counts = replace(counts, visits=np.bincount(j[j != NONE], minlength=niches.states))
         if elite is None:
             return counts
-        uid = as_whole("elite", elite)
+        uid = _states("elite", elite)
         if uid.shape != i.shape:
             raise NichechainError(f"elites have shape {uid.shape} and parents {i.shape}, but must be alike")
         # Children whose parents are not known are not siblings for that.
         own = moved & (uid != NONE)
         return replace(counts, families=tabulated(i[own], uid[own], j[own]))
+
+    @classmethod
+    def _from_table(cls, births: Any, niches: Niches) -> TransitionCounts:
+        names = list(getattr(births, "column_names", births.columns))
+        for name in ("parent_niche", "child_niche"):
+            if name not in names:
+                raise NichechainError(f"births have no column {name}, but need parent_niche and child_niche")
+        elite = None
+        if "parent_uid" in names:
+            elite = _states("parent_uid", births["parent_uid"])
+            if "run" in names:
+                (elite,) = across_runs(_states("run", births["run"]), elite)
+        return cls.from_births(births["parent_niche"], births["child_niche"], niches, elite=elite)
+
+    @classmethod
+    def from_trajectories(cls, trajectories: Iterable[ArrayLike], niches: Niches) -> TransitionCounts:
+        """Counts of the steps of lineages.
+
+        Parameters
+        ----------
+        trajectories : iterable of (L,) ints
+            States of one lineage each, generation after generation. One of a single state is a visit.
+        niches : Niches
+            The niches that the numbers belong to.
+
+        Raises
+        ------
+        NichechainError
+            If a trajectory is no sequence of states that exist.
+        """
+        if not isinstance(trajectories, Iterable):
+            raise NichechainError(f"trajectories is {trajectories!r}, but must be sequences of states")
+        lineages = [as_whole("trajectories", each) for each in trajectories]
+        for lineage in lineages:
+            if lineage.ndim != 1:
+                raise NichechainError(
+                    f"trajectories has one of shape {lineage.shape}, but each must be a sequence of states"
+                )
+        empty = np.empty(0, np.int64)
+        first = np.concatenate([empty, *(lineage[:1] for lineage in lineages)])
+        parent = np.concatenate([empty, *(lineage[:-1] for lineage in lineages)])
+        child = np.concatenate([empty, *(lineage[1:] for lineage in lineages)])
+        _check_pairs(first, first, niches, lowest=0)
+        counts = cls.from_pairs(parent, child, niches)
+        return replace(counts, visits=counts.visits + np.bincount(first, minlength=niches.states))
+
+    @classmethod
+    def from_matrix(cls, matrix: ArrayLike | sparse.sparray, niches: Niches) -> TransitionCounts:
+        """Counts that are known already.
+
+        Parameters
+        ----------
+        matrix : (S, S) array or scipy.sparse matrix of whole numbers
+            ``matrix[i, j]`` births in state j of parents in state i.
+        niches : Niches
+            S is their number of states.
+
+        Raises
+        ------
+        NichechainError
+            If the matrix has another shape, or has numbers that count no births.
+        """
+        if not sparse.issparse(matrix):
+            matrix = as_floats("matrix", matrix)
+        if matrix.shape != (niches.states, niches.states):  # type: ignore[union-attr]
+            raise NichechainError(
+                f"matrix has shape {matrix.shape}, "  # type: ignore[union-attr]
+                f"but must have ({niches.states}, {niches.states}), a row for each state"
+            )
+        entries = sparse.coo_array(matrix)
+        parent, child = entries.coords
+        n = _multiplicities("matrix", entries.data, parent.shape)
+        return cls.from_pairs(parent, child, niches, n=n)
 
     @classmethod
     def from_pairs(
@@ -94,11 +199,12 @@ class TransitionCounts:
         Raises
         ------
         NichechainError
-            If the lengths differ, a state does not exist or a number is negative.
+            If the lengths differ, a state does not exist, a number is negative, or there are more than
+            2**53 births in all.
         """
         i, j = as_whole("parent", parent), as_whole("child", child)
         _check_pairs(i, j, niches, lowest=0)
-        size = np.ones(i.size, np.int64) if n is None else _multiplicities(n, i.shape)
+        size = np.ones(i.size, np.int64) if n is None else _multiplicities("n", n, i.shape)
         shape = (niches.states, niches.states)
         matrix = sparse.coo_array((size, (i, j)), shape=shape).tocsr()
         # A pair that stands for no birth is no transition.
@@ -113,10 +219,11 @@ class TransitionCounts:
         Raises
         ------
         NichechainError
-            If the niches differ.
+            If the niches differ, or there are more than 2**53 births in all.
         """
         if self.niches != other.niches:
             raise NichechainError(f"niches differ: {self.niches} and {other.niches}")
+        _check_total("the sum", float(self.births.sum()) + float(other.births.sum()))
         later = other.families.copy()
         if len(self.families):
             # Elites of two runs may bear the same number.
@@ -155,13 +262,35 @@ class TransitionCounts:
         return int(self.visits[len(self.niches) :].sum())
 
 
-def _multiplicities(n: ArrayLike, shape: tuple[int, ...]) -> Ints:
-    given = as_floats("n", n)
+def _multiplicities(name: str, n: ArrayLike, shape: tuple[int, ...]) -> Ints:
+    given = as_floats(name, n)
     if given.shape != shape:
-        raise NichechainError(f"n has shape {given.shape}, but must have {shape}, one number for each pair")
+        raise NichechainError(
+            f"{name} has shape {given.shape}, but must have {shape}, one number for each pair"
+        )
     if not (np.isfinite(given).all() and (given >= 0).all() and (given == np.floor(given)).all()):
-        raise NichechainError("n has numbers that are negative or no whole numbers, but counts births")
+        raise NichechainError(f"{name} has numbers that are negative or no whole numbers, but counts births")
+    _check_total(name, float(given.sum()))
     return given.astype(np.int64)
+
+
+def _check_total(name: str, births: float) -> None:
+    """Refuse more births than floating-point numbers, and sums of whole ones, can count."""
+    if births > _MOST_BIRTHS:
+        raise NichechainError(f"{name} is {births:.3g} births in all, but at most 2**53 can be counted")
+
+
+def _states(name: str, values: Any) -> Ints:
+    """Numbers of states, -1 for what pandas and Arrow call null."""
+    if hasattr(values, "fill_null"):
+        # Of Arrow.
+        values = values.fill_null(NONE).to_numpy(zero_copy_only=False) if values.null_count else values
+    elif hasattr(values, "isna"):
+        # Of pandas, where NaN stands for null in a column of floats.
+        values = values.fillna(NONE)
+    elif np.ma.isMaskedArray(values):
+        values = values.filled(NONE)
+    return as_whole(name, values)
 
 
 def _check_pairs(parent: Ints, child: Ints, niches: Niches, *, lowest: int) -> None:

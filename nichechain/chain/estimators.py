@@ -63,6 +63,12 @@ def estimate(
     NichechainError
         If an argument is unknown or belongs to another estimator.
     """
+    if not isinstance(counts, TransitionCounts):
+        raise NichechainError(
+            f"counts is of type {type(counts).__name__}, but must be TransitionCounts: "
+            "TransitionCounts.from_matrix makes them of a matrix of counts, "
+            "and NicheChain(T) takes a matrix of probabilities"
+        )
     check_choice("estimator", estimator, ESTIMATORS)
     if estimator == "mle":
         if strength is not None:

@@ -6,8 +6,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from nichechain.births.joins import across_runs
-from nichechain.births.table import NONE, check_columns
+from nichechain.births.table import check_columns
 from nichechain.chain.counts import TransitionCounts
 from nichechain.core.errors import NichechainError
 from nichechain.niches import Niches
@@ -60,12 +59,7 @@ def counts_of(
         births = births.filter(pc.and_(pc.greater_equal(step, first), pc.less(step, end)))
     if accepted:
         births = births.filter(_said(births, "accepted", "whether they were accepted"))
-    parent, child, elite, number = (
-        births[name].fill_null(NONE).to_numpy().astype(np.int64)
-        for name in ("parent_niche", "child_niche", "parent_uid", "run")
-    )
-    (elite,) = across_runs(number, elite)
-    return TransitionCounts.from_births(parent, child, niches, elite=elite)
+    return TransitionCounts.from_births(births, niches)
 
 
 def _run(births: pa.Table, run: int) -> int:

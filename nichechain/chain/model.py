@@ -25,6 +25,10 @@ Matrix: TypeAlias = "Floats | sparse.csr_array"
 Transition: TypeAlias = "Matrix | PooledTransition"
 
 
+# T as a matrix, where it is kept in parts: 16,384 states.
+_MOST_BYTES = 2**31
+
+
 class NicheChain:
     """A Markov chain whose states are niches: step 4 of the paper's procedure. Immutable.
 
@@ -44,11 +48,14 @@ class NicheChain:
         The births that T was estimated from.
     estimator : str
         How T came about.
+    normalize : bool
+        Whether to divide each row of ``transition`` by its sum, for counts, or for rows that sum to 1
+        only in single precision.
 
     Raises
     ------
     NichechainError
-        If the matrix is not square, not finite, negative, or a row does not sum to 1.
+        If the matrix is not square, not real, not finite, negative, or a row does not sum to 1.
     """
 
     def __init__(
@@ -60,10 +67,11 @@ class NicheChain:
         posterior: DirichletPosterior | None = None,
         counts: TransitionCounts | None = None,
         estimator: str = "given",
+        normalize: bool = False,
     ) -> None:
         if (transition is None) == (posterior is None):
             raise NichechainError("a chain needs either a transition matrix or a posterior")
-        self._given = None if transition is None else _stochastic(transition)
+        self._given = None if transition is None else _stochastic(transition, normalize=normalize)
         self.niches = niches
         self.posterior = posterior
         self.counts = counts
@@ -95,7 +103,19 @@ class NicheChain:
 
     @cached_property
     def T(self) -> Matrix:  # noqa: N802  # the paper's name
-        """The transition matrix (S, S); its posterior mean where it was estimated with one."""
+        """The transition matrix (S, S); its posterior mean where it was estimated with one.
+
+        Raises
+        ------
+        NichechainError
+            If T is kept in parts and would take more than 2 GiB as a matrix.
+        """
+        parts = self._given is None or isinstance(self._given, PooledTransition)
+        if parts and 8 * self.states**2 > _MOST_BYTES:
+            raise NichechainError(
+                f"T of {self.states} states would take {8 * self.states**2 / 2**30:.1f} GiB as a matrix: "
+                "multiply with chain.operator instead"
+            )
         if isinstance(self._given, PooledTransition):
             return self._given.toarray()
         if self._given is not None:
@@ -157,35 +177,59 @@ class NicheChain:
         return reachability_graph(self, threshold)
 
 
-def _stochastic(transition: ArrayLike | sparse.sparray | sparse.spmatrix | PooledTransition) -> Transition:
+def _stochastic(
+    transition: ArrayLike | sparse.sparray | sparse.spmatrix | PooledTransition, *, normalize: bool
+) -> Transition:
     """The matrix in float64, sparse if it was, after checking that it is row-stochastic."""
     if isinstance(transition, PooledTransition):
         return transition
     matrix: Matrix
-    if sparse.issparse(transition):
-        as_given = sparse.csr_array(transition)
-        given = as_given.dtype
-        matrix = as_given.astype(np.float64)
-        values = matrix.data
-    else:
-        try:
-            array = np.asarray(transition)
-            given = array.dtype
-            matrix = array.astype(np.float64)
-        except (TypeError, ValueError):
-            raise NichechainError("T has rows of unequal length or values that are no numbers") from None
-        values = matrix
+    try:
+        array = sparse.csr_array(transition) if sparse.issparse(transition) else np.asarray(transition)
+        given = array.dtype
+        if given.kind == "c":
+            raise NichechainError("T has complex numbers, but must have probabilities: take T.real if it is")
+        matrix = array.astype(np.float64)
+    except (TypeError, ValueError) as error:
+        if isinstance(error, NichechainError):
+            raise
+        raise NichechainError("T has rows of unequal length or values that are no numbers") from None
     if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1] or not matrix.shape[0]:
         raise NichechainError(f"T has shape {matrix.shape}, but must be square with at least one state")
+    values = matrix if isinstance(matrix, np.ndarray) else matrix.data
     if not np.isfinite(values).all():
         raise NichechainError("T has NaN or infinite values, but must have probabilities")
     if values.size and values.min() < 0:
         raise NichechainError(f"T has a value of {values.min():g}, but probabilities are not negative")
     sums = np.asarray(matrix.sum(axis=1)).ravel()
+    if normalize:
+        matrix = _divided(matrix, sums)
+        values = matrix if isinstance(matrix, np.ndarray) else matrix.data
+    else:
+        _check_sums(sums, given)
+    values.setflags(write=False)
+    return matrix
+
+
+def _divided(matrix: Matrix, sums: Floats) -> Matrix:
+    """Rows divided by their sums."""
+    odd = np.flatnonzero(~((sums > 0.0) & np.isfinite(sums)))
+    if odd.size:
+        raise NichechainError(
+            f"row {odd[0]} of T sums to {sums[odd[0]]:g}, so normalize=True cannot make it sum to 1"
+        )
+    if isinstance(matrix, np.ndarray):
+        return matrix / sums[:, None]
+    return sparse.csr_array(sparse.diags_array(1.0 / sums) @ matrix)
+
+
+def _check_sums(sums: Floats, given: np.dtype[Any]) -> None:
+    """Refuse rows that do not sum to 1 in the precision that they were given in."""
     precision = np.finfo(given).eps if np.issubdtype(given, np.floating) else np.finfo(float).eps
     off = np.abs(sums - 1.0)
     worst = int(np.argmax(off))
-    if off[worst] > 8 * matrix.shape[0] * precision + 1e-12:
-        raise NichechainError(f"row {worst} of T sums to {sums[worst]:.9g}, but every row must sum to 1")
-    values.setflags(write=False)
-    return matrix
+    if off[worst] > 8 * sums.size * precision + 1e-12:
+        raise NichechainError(
+            f"row {worst} of T sums to {sums[worst]:.9g}, but every row must sum to 1: "
+            "normalize=True divides each row by its sum"
+        )

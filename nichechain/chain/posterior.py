@@ -129,6 +129,10 @@ class DirichletPosterior:
         index = np.concatenate([rows, parents]), np.concatenate([columns, landed])
         return _collected(*self._absorbed(data, index), states)
 
+    def settled(self, rng: np.random.Generator) -> DirichletPosterior:  # noqa: ARG002
+        """The same under one draw of base and strength, where these are not known either."""
+        return self
+
     def _draw_atoms(
         self, known: Floats, observed: tuple[Ints, Ints, Floats], rng: np.random.Generator
     ) -> PooledTransition:

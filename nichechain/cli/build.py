@@ -18,7 +18,12 @@ from nichechain.core.errors import ArchiveError, NichechainError
 from nichechain.search.config import MOST_FAILED, BuildConfig, SearchConfig
 
 _GRID = "20x20"
+# Beyond so many niches, only those of the most births are scored, with few draws.
 _MANY_NICHES = 1000
+_SCORED = 200
+_FEW_DRAWS = 20
+# Births that a niche must have to be ranked.
+_RANKED = 20
 
 
 def _step_bound(text: str, option: str) -> tuple[StepBound, float]:
@@ -219,10 +224,12 @@ def run(arguments: Sequence[str]) -> int:
 
 def _report(folder: Path, shown: object) -> None:
     """A short account of a finished build, and what to do next."""
+    import numpy as np
     from rich.console import Console
 
     from nichechain.archive.archive import load
-    from nichechain.evolvability import DRAWS, niche_evolvability
+    from nichechain.evolvability.niches import answer_for_niches
+    from nichechain.evolvability.question import DRAWS, Question
     from nichechain.search import savings
 
     assert isinstance(shown, Console)
@@ -230,9 +237,13 @@ def _report(folder: Path, shown: object) -> None:
     counts = archive.counts
     chain = archive.chain()
     n = len(archive.niches)
-    # A first look; many states take minutes with as many draws as an answer should rest on.
-    scores = niche_evolvability(chain, draws=DRAWS if n <= _MANY_NICHES else 5)
-    ranking = scores.ranking(chain).head(5)
+    # A first look, which should keep nobody waiting: only the niches that it may show are scored.
+    births_of = counts.births[:n]
+    most = np.argsort(-births_of, kind="stable")[: _SCORED if n > _MANY_NICHES else n]
+    roots = np.sort(most[births_of[most] >= _RANKED])
+    question = Question(draws=DRAWS if n <= _MANY_NICHES else _FEW_DRAWS)
+    scores = answer_for_niches(chain, question, roots=roots)
+    ranking = scores.ranking(chain, min_births=_RANKED).dropna().head(5)
     failed = archive.meta.births - int(counts.visits.sum())
     births = archive.meta.births
     rows = {

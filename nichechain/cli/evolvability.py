@@ -35,8 +35,9 @@ class EvolvabilityCommand:
     """The genotype of a niche's elite: its own offspring are evaluated and begin the lineages."""
     top: Annotated[int | None, parsing.option("INT", "10")] = None
     """So many of the best niches."""
-    method: Literal["exact", "monte-carlo"] = "exact"
-    """In closed form, or by the paper's simulation."""
+    method: Literal["auto", "exact", "monte-carlo"] = "auto"
+    """In closed form, or by the paper's simulation; auto is in closed form up to 1,000 states, and beyond
+    simulates lineages on rows of T that are drawn where they are entered."""
     convention: Literal["definition", "procedure"] = "definition"
     """Whether the descendants alone count, or the root's own niche as well."""
     estimator: parsing.EstimatorName = "empirical-bayes"
@@ -102,8 +103,8 @@ def _check(command: EvolvabilityCommand) -> None:
             raise NichechainError(f"{wanted} is of niches, but --elite asks for a genotype: ask for --niche")
         if command.estimator != "empirical-bayes":
             raise NichechainError(f"{wanted} belongs to empirical-bayes, not to {command.estimator}")
-        if command.method != "exact":
-            raise NichechainError(f"{wanted} is computed in closed form, not by {command.method}")
+        if command.method == "monte-carlo":
+            raise NichechainError(f"{wanted} is not computed by {command.method}")
     for name in ("top", "offspring", "draws", "repeats"):
         if getattr(command, name) is not None:
             check_at_least(1, **{f"--{name}": getattr(command, name)})
@@ -149,15 +150,24 @@ def _one(command: EvolvabilityCommand, archive: Archive, chain: NicheChain) -> p
 
 def _best(command: EvolvabilityCommand, chain: NicheChain) -> pd.DataFrame:
     """The best niches, best first."""
-    from nichechain.evolvability import niche_evolvability
+    import numpy as np
 
-    scores = niche_evolvability(chain, **command.asked())
-    ranking = scores.ranking(chain, min_births=command.min_births)
-    if ranking.empty:
+    from nichechain.evolvability.niches import answer_for_niches
+    from nichechain.evolvability.question import Question
+
+    question = Question(**command.asked())
+    # Only niches that are ranked have to be scored.
+    births = np.zeros(chain.n_niches) if chain.births is None else chain.births[: chain.n_niches]
+    ranked = np.flatnonzero(births >= command.min_births)
+    if not ranked.size:
         raise NichechainError(
             f"no niche has {command.min_births} births behind its row of T: "
             "lower --min-births or build further"
         )
+    draws = 1 if chain.posterior is None else command.draws
+    with progress.counting(draws, "draws of T") as tell:
+        scores = answer_for_niches(chain, question, roots=ranked, tell=tell)
+    ranking = scores.ranking(chain, min_births=command.min_births)
     frame = ranking.head(command.top or 10).copy()
     frame.insert(2, "root", "niche")
     for name in ("l", "lineages", "method", "convention", "estimator", "saturated"):

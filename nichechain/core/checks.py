@@ -152,7 +152,11 @@ def as_floats(name: str, values: ArrayLike) -> NDArray[np.float64]:
     import numpy as np
 
     try:
-        return np.asarray(values, np.float64)
+        given = np.asarray(values)
+        if given.dtype.kind == "c":
+            # NumPy would drop the imaginary parts with a warning.
+            raise TypeError
+        return given.astype(np.float64, copy=False)
     except (TypeError, ValueError):
         raise NichechainError(f"{name} has values that are no numbers, or rows of unequal length") from None
 
@@ -169,12 +173,16 @@ def as_whole(name: str, values: ArrayLike) -> NDArray[np.int64]:
 
     try:
         given = np.asarray(values)
+        if given.dtype.kind == "c":
+            raise TypeError
         with np.errstate(invalid="ignore"):
             whole = given.astype(np.int64)
     except (TypeError, ValueError, OverflowError):
         raise NichechainError(
             f"{name} has values that are no whole numbers, or rows of unequal length"
         ) from None
+    if given.dtype.kind == "u" and (given > np.iinfo(np.int64).max).any():
+        raise NichechainError(f"{name} has the value {given.max()}, but must be below 2**63")
     if given.dtype.kind not in "iub" and not np.array_equal(given.astype(np.float64), whole):
         odd = given.ravel()[given.astype(np.float64).ravel() != whole.ravel()]
         raise NichechainError(f"{name} has the value {odd[0]}, but must have whole numbers")

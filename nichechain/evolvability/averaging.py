@@ -29,7 +29,7 @@ def one_root(chain: NicheChain, samples: Iterator[Sample], question: Question, r
     n = chain.n_niches
     means, errors, saturated = [], [], False
     for number, (matrix, first) in enumerate(samples):
-        if question.method == "exact":
+        if question.method != "monte-carlo":
             covered, endless = expected_coverage(
                 matrix, first[None, :], question.steps, [question.lineages, ENDLESS], counted=n
             )[0]
@@ -51,7 +51,7 @@ def one_root(chain: NicheChain, samples: Iterator[Sample], question: Question, r
         high,
         question.l,
         question.lineages,
-        question.method,
+        "exact" if question.method == "auto" else question.method,
         question.convention,
         chain.estimator,
         None,

@@ -36,7 +36,7 @@ def genotype_evolvability(
     first_generation: FirstGeneration = "posterior",
     strength: float | None = None,
     chain: NicheChain | None = None,
-    method: Method = "exact",
+    method: Method = "auto",
     convention: Convention = "definition",
     repeats: int = 100,
     draws: int = DRAWS,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -14,9 +15,13 @@ from nichechain.evolvability.averaging import ENDLESS, SATURATED, one_root, stan
 from nichechain.evolvability.coverage import expected_coverage, sampled_coverage
 from nichechain.evolvability.question import DRAWS, Convention, Method, Question, Root
 from nichechain.evolvability.results import Evolvability, NicheEvolvability
+from nichechain.evolvability.urns import simulated_coverage
 from nichechain.niches import Niche
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+URNS = "urns"
 
 
 def l_evolvability(
@@ -26,7 +31,7 @@ def l_evolvability(
     offspring: ArrayLike | None = None,
     l: int = 5,
     lineages: int = 100,
-    method: Method = "exact",
+    method: Method = "auto",
     convention: Convention = "definition",
     repeats: int = 100,
     draws: int = DRAWS,
@@ -45,8 +50,9 @@ def l_evolvability(
         Generations, at least 1.
     lineages : int
         Number U of independent lineages, at least 1: l·U descendants.
-    method : {"exact", "monte-carlo"}
-        Closed form, or the paper's simulation.
+    method : {"auto", "exact", "monte-carlo"}
+        Closed form, the paper's simulation, or whichever of closed form and
+        :mod:`urns <nichechain.evolvability.urns>` suits the number of states.
     convention : {"definition", "procedure"}
         Whether the root's own state counts, see the module.
     repeats : int
@@ -75,6 +81,8 @@ def l_evolvability(
 
 def answer(chain: NicheChain, root: Root, question: Question) -> Evolvability:
     """What :func:`l_evolvability` answers to a question that has been checked."""
+    if question.by_urns(chain):
+        return replace(_one_by_urns(chain, root, question), births=root.births)
     samples = ((matrix, root.first(matrix, question)) for matrix in question.transitions(chain))
     result = one_root(chain, samples, question, question.repeats_of_each(chain))
     return replace(result, births=root.births)
@@ -85,7 +93,7 @@ def niche_evolvability(
     *,
     l: int = 5,
     lineages: int = 100,
-    method: Method = "exact",
+    method: Method = "auto",
     convention: Convention = "definition",
     repeats: int = 100,
     draws: int = DRAWS,
@@ -110,29 +118,67 @@ def niche_evolvability(
     return answer_for_niches(chain, Question(l, lineages, convention, method, repeats, draws, seed))
 
 
-def answer_for_niches(chain: NicheChain, question: Question) -> NicheEvolvability:
-    """What :func:`niche_evolvability` answers to a question that has been checked."""
+def answer_for_niches(
+    chain: NicheChain,
+    question: Question,
+    *,
+    roots: Ints | None = None,
+    tell: Callable[[int], None] | None = None,
+) -> NicheEvolvability:
+    """What :func:`niche_evolvability` answers to a question that has been checked.
+
+    Parameters
+    ----------
+    chain : NicheChain
+    question : Question
+    roots : (m,) int64 array, optional
+        The niches that are asked for, where not all: others have NaN.
+    tell : callable, optional
+        Told how many draws of T are done.
+    """
     n, steps, lineages = chain.n_niches, question.steps, question.lineages
+    asked = np.arange(n) if roots is None else roots
+    if question.by_urns(chain) and asked.size:
+        return _by_urns(chain, question, asked, tell)
     size = question.repeats_of_each(chain)
     standing = sparse.eye_array(chain.states, format="csr")
     means, errors, saturated = [], [], False
     for number, matrix in enumerate(question.transitions(chain)):
-        first: Transition = standing if question.root_counts else matrix
-        if question.method == "exact":
-            covered = expected_coverage(matrix, first, steps, [lineages, ENDLESS], counted=n)[:n]
-            saturated |= bool(np.median(covered[:, 0] / np.maximum(covered[:, 1], 1e-300)) > SATURATED)
+        first: Transition = (standing if question.root_counts else matrix)[asked]
+        if question.method != "monte-carlo":
+            covered = expected_coverage(matrix, first, steps, [lineages, ENDLESS], counted=n)
+            share = covered[:, 0] / np.maximum(covered[:, 1], 1e-300)
+            saturated |= bool(asked.size and np.median(share) > SATURATED)
             means.append(covered[:, 0])
-            errors.append(np.zeros(n))
+            errors.append(np.zeros(asked.size))
         else:
             rng = keyed(question.seed, Purpose.WALKS, number)
-            roots = (Root(chain, niche=niche).first(matrix, question) for niche in range(n))
+            starts = (Root(chain, niche=int(niche)).first(matrix, question) for niche in asked)
             sampled = [
-                sampled_coverage(matrix, root, steps, lineages, size, rng, counted=n) for root in roots
+                sampled_coverage(matrix, start, steps, lineages, size, rng, counted=n) for start in starts
             ]
             means.append(np.mean(sampled, axis=1))
             errors.append(np.array([standard_error(walks) for walks in sampled]))
-    value, error, low, high = summary(np.array(means), np.array(errors))
-    births = None if chain.births is None else chain.births[:n]
+        if tell is not None:
+            tell(number + 1)
+    figures = summary(np.array(means), np.array(errors))
+    method = "exact" if question.method == "auto" else question.method
+    return _of_all(chain, question, asked, figures, method, saturated)
+
+
+def _of_all(
+    chain: NicheChain,
+    question: Question,
+    asked: Ints,
+    figures: tuple[Floats, Floats, Floats, Floats],
+    method: str,
+    saturated: bool,
+) -> NicheEvolvability:
+    """The answer for all niches, NaN where they were not asked for."""
+    whole = np.full((4, chain.n_niches), np.nan)
+    whole[:, asked] = figures
+    births = None if chain.births is None else chain.births[: chain.n_niches]
+    value, error, low, high = whole
     return NicheEvolvability(
         value,
         error,
@@ -140,9 +186,40 @@ def answer_for_niches(chain: NicheChain, question: Question) -> NicheEvolvabilit
         high,
         births,
         question.l,
-        lineages,
-        question.method,
+        question.lineages,
+        method,
         question.convention,
         chain.estimator,
         saturated,
+    )
+
+
+def _by_urns(
+    chain: NicheChain, question: Question, asked: Ints, tell: Callable[[int], None] | None
+) -> NicheEvolvability:
+    assert chain.posterior is not None
+    found = simulated_coverage(chain.posterior, question, [question.lineages], roots=asked, tell=tell)
+    figures = found.summary()
+    # Where nothing is impossible, lineages without end visit every niche.
+    saturated = bool(asked.size and np.median(figures[0]) > SATURATED * chain.n_niches)
+    return _of_all(chain, question, asked, figures, URNS, saturated)
+
+
+def _one_by_urns(chain: NicheChain, root: Root, question: Question) -> Evolvability:
+    assert chain.posterior is not None
+    start = {"offspring": root.distribution} if root.state is None else {"roots": np.array([root.state])}
+    found = simulated_coverage(chain.posterior, question, [question.lineages], **start)
+    value, error, low, high = (float(figure[0]) for figure in found.summary())
+    return Evolvability(
+        value,
+        error,
+        low,
+        high,
+        question.l,
+        question.lineages,
+        URNS,
+        question.convention,
+        chain.estimator,
+        None,
+        value > SATURATED * chain.n_niches,
     )

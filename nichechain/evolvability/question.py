@@ -17,11 +17,16 @@ from nichechain.core.randomness import Purpose, keyed
 from nichechain.niches import Niche
 
 Floats = NDArray[np.float64]
-Method = Literal["exact", "monte-carlo"]
+Method = Literal["auto", "exact", "monte-carlo"]
 Convention = Literal["definition", "procedure"]
 
 DRAWS = 50
 """Posterior draws of T that a value is averaged over."""
+MOST_EXACT = 1_000
+"""States up to which l-evolvability of an estimated chain is computed in closed form by default."""
+
+# Lineages that are longer or more numerous cost more to simulate than their closed form.
+_LONGEST, _MOST_LINEAGES = 1_000, 10_000
 
 
 @dataclass(frozen=True)
@@ -36,8 +41,9 @@ class Question:
         Number U of independent lineages, at least 1: l·U descendants.
     convention : {"definition", "procedure"}
         Whether the root's own state counts, see :mod:`nichechain.evolvability`.
-    method : {"exact", "monte-carlo"}
-        Closed form, or the paper's simulation.
+    method : {"auto", "exact", "monte-carlo"}
+        Closed form; the paper's simulation; or, by default, closed form up to a thousand states and
+        beyond, where T is estimated, lineages simulated on every draw of T at once.
     repeats : int
         Simulations over all draws, at least 1.
     draws : int
@@ -54,7 +60,7 @@ class Question:
     l: int = 5
     lineages: int = 100
     convention: Convention = "definition"
-    method: Method = "exact"
+    method: Method = "auto"
     repeats: int = 100
     draws: int = DRAWS
     seed: int = 0
@@ -74,6 +80,11 @@ class Question:
     def steps(self) -> int:
         """States of a lineage that count: l, and the root's own where it does."""
         return self.l + self.root_counts
+
+    def by_urns(self, chain: NicheChain) -> bool:
+        """Whether rows of T are only drawn where lineages enter them, since there are many."""
+        small = chain.states <= MOST_EXACT or self.l > _LONGEST or self.lineages > _MOST_LINEAGES
+        return self.method == "auto" and chain.posterior is not None and not small
 
     def transitions(self, chain: NicheChain, *, redraw: bool = False) -> Iterator[Transition]:
         """T itself where it is given, draws from its posterior where it is estimated with one.
@@ -129,20 +140,20 @@ class Root:
         self.state = None if niche is None else chain.state(niche)
         known = self.state is not None and chain.births is not None
         self.births: int | None = int(chain.births[self.state]) if known else None  # type: ignore[index]
-        self._distribution = np.zeros(chain.states)
+        self.distribution = np.zeros(chain.states)
         if offspring is not None:
-            self._distribution = _distribution(offspring, chain)
+            self.distribution = _distribution(offspring, chain)
         else:
-            self._distribution[self.state] = 1.0
+            self.distribution[self.state] = 1.0
 
     def first(self, transition: Transition, question: Question) -> Floats:
         """Distribution of the first state that counts, (S,): the root's own, or its child's."""
-        return self._distribution if question.root_counts else self.children(transition)
+        return self.distribution if question.root_counts else self.children(transition)
 
     def children(self, transition: Transition) -> Floats:
         """Distribution of generation 1, (S,)."""
         if self.state is None:
-            return self._distribution
+            return self.distribution
         if isinstance(transition, np.ndarray):
             row: Floats = transition[self.state]
         else:

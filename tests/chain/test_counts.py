@@ -5,10 +5,14 @@ from __future__ import annotations
 from collections import Counter
 
 import numpy as np
+import pandas as pd
+import pyarrow as pa
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy import sparse
 
+import nichechain as nc
 from nichechain import GridNiches, NichechainError, TransitionCounts
 
 # Six niches and the outside, state 6.
@@ -172,3 +176,86 @@ def test_elites_of_two_searches_stay_apart_whatever_their_numbers():
     assert len(np.unique(together.families[:, :2], axis=0)) == sum(map(len, numbers))
     assert together.families[:, 3].sum() == sum(map(len, numbers))
     np.testing.assert_array_equal(together.families[:3], sides[0].families)
+
+
+def test_births_of_an_archive_by_column_and_in_one_go():
+    archive = nc.load("fetch-pick-and-place")
+    births = archive.births()
+    columns = TransitionCounts.from_births(births.parent_niche, births.child_niche, archive.niches)
+    assert columns.births.sum() == 39_900
+    np.testing.assert_array_equal(columns.visits, archive.counts.visits)
+    whole = TransitionCounts.from_births(births, archive.niches)
+    assert (whole.matrix != archive.counts.matrix).nnz == 0
+    np.testing.assert_array_equal(whole.families, archive.counts.families)
+
+
+_FRAME = pd.DataFrame({"parent_niche": [np.nan, 0, 0, 1], "child_niche": [0, 1, np.nan, 6]})
+
+
+@pytest.mark.parametrize(
+    "table",
+    [
+        _FRAME,
+        _FRAME.astype("Int32"),
+        pa.Table.from_pandas(_FRAME.astype("Int32")),
+        pa.Table.from_pandas(_FRAME),
+        _FRAME.assign(parent_uid=[np.nan, 0, 0, 1], run=0),
+    ],
+    ids=["NaN", "nullable", "arrow", "arrow-nulls-from-NaN", "families"],
+)
+def test_nulls_are_null_whatever_they_are_called(table):
+    counts = TransitionCounts.from_births(table, GRID)
+    assert counts.matrix.toarray()[[0, 1], [1, 6]].tolist() == [1, 1]
+    assert counts.births.sum() == 2
+    assert counts.visits.tolist() == [1, 1, 0, 0, 0, 0, 1]
+    assert len(counts.families) == (2 if "parent_uid" in getattr(table, "columns", ()) else 0)
+
+
+def test_masked_states_are_null():
+    parent = np.ma.masked_array([3, 0], [True, False])
+    assert TransitionCounts.from_births(parent, [0, 1], GRID).births.tolist() == [1, 0, 0, 0, 0, 0, 0]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ((pd.DataFrame({"parent_niche": [1]}), GRID), "births have no column child_niche"),
+        ((_FRAME, [1, 2, 3, 4]), "comes with its niches alone"),
+        ((_FRAME, GRID, GRID), "comes with its niches alone"),
+        (([0], [1]), "niches are missing"),
+        ((np.array([2**64 - 1, 0], np.uint64), [1, 2], GRID), "parent has the value 18446744073709551615"),
+        ((pd.Series([0.5]), [1], GRID), "parent has the value 0.5"),
+        ((np.array([1j]), [1], GRID), "parent has values that are no whole numbers"),
+    ],
+)
+def test_tables_and_columns_are_refused(arguments, message):
+    with pytest.raises(NichechainError, match=message):
+        TransitionCounts.from_births(*arguments)
+
+
+def test_lineages_are_steps():
+    counts = TransitionCounts.from_trajectories([[0, 1, 6, 1], np.array([5]), []], GRID)
+    assert {(i, j) for i, j in zip(*counts.matrix.nonzero(), strict=True)} == {(0, 1), (1, 6), (6, 1)}
+    assert counts.visits.tolist() == [1, 2, 0, 0, 0, 1, 1]
+    assert TransitionCounts.from_trajectories([], GRID).births.sum() == 0
+
+
+@pytest.mark.parametrize("form", [np.asarray, sparse.csr_array, sparse.coo_matrix])
+def test_a_matrix_of_counts(form):
+    matrix = np.random.default_rng(0).integers(3, size=(7, 7))
+    counts = TransitionCounts.from_matrix(form(matrix), GRID)
+    np.testing.assert_array_equal(counts.matrix.toarray(), matrix)
+    np.testing.assert_array_equal(counts.visits, matrix.sum(axis=0))
+
+
+@pytest.mark.parametrize("n", [[2**62] * 3, [1e19, 0, 0], [2**53, 2, 2], [1e300, 0, 0]])
+def test_more_births_than_can_be_counted(n):
+    with pytest.raises(NichechainError, match=r"n is .* births in all, but at most 2\*\*53 can be counted"):
+        TransitionCounts.from_pairs([0, 0, 0], [1, 1, 2], GRID, n=n)
+
+
+def test_a_merge_of_more_births_than_can_be_counted():
+    half = TransitionCounts.from_pairs([0], [1], GRID, n=[2**52])
+    assert (half + half).births[0] == 2**53
+    with pytest.raises(NichechainError, match="at most"):
+        half + (half + half)

@@ -81,7 +81,8 @@ BAD = [
     ([[1.0, 0.0], [0.0, 0.0]], "row 1 of T sums to 0"),
     (np.array([[3, 1], [0, 4]]), "row 0 of T sums to 4"),
     (np.array([[0.999, 0.0], [0.0, 1.0]], np.float32), "row 0 of T sums to 0.999"),
-    (np.array([[1 - 1e-6, 0.0], [0.0, 1.0]]), "row 0 of T sums to 0.999999"),
+    (np.array([[1 - 1e-6, 0.0], [0.0, 1.0]]), "row 0 of T sums to 0.999999.*normalize=True"),
+    (np.array([[1, 0], [0.5 + 0.3j, 0.5 - 0.3j]]), "T has complex numbers"),
 ]
 
 
@@ -188,3 +189,30 @@ def test_the_matrix_of_an_estimated_chain_is_its_posterior_mean():
     np.testing.assert_array_equal(chain.T, chain.posterior.mean())
     assert (chain.states, chain.n_niches, chain.outside) == (5, 4, 4)
     assert chain.births.tolist() == [2, 1, 0, 0, 1]
+
+
+@pytest.mark.parametrize("form", [np.array, sparse.csr_array])
+def test_rows_are_divided_by_their_sums_where_that_is_asked_for(form):
+    rows = np.random.default_rng(0).random((400, 400)).astype(np.float32)
+    rows /= rows.sum(axis=1, keepdims=True)
+    given = form(rows.astype(np.float64))
+    with pytest.raises(NichechainError, match="normalize=True divides each row by its sum"):
+        NicheChain(given)
+    chain = NicheChain(given, normalize=True)
+    np.testing.assert_allclose(np.asarray(chain.T.sum(axis=1)).ravel(), 1.0, rtol=1e-14)
+    counts = NicheChain(form(np.array([[3, 1], [0, 2]])), normalize=True).T
+    np.testing.assert_array_equal(counts if form is np.array else counts.toarray(), [[0.75, 0.25], [0, 1]])
+    with pytest.raises(NichechainError, match="row 1 of T sums to 0, so normalize=True cannot"):
+        NicheChain(form(np.array([[1.0, 1.0], [0.0, 0.0]])), normalize=True)
+
+
+def test_a_large_posterior_mean_is_refused_before_memory_is_asked_for():
+    niches = GridNiches((268, 268), ((0.0, 1.0), (0.0, 1.0)))
+    chain = estimate(TransitionCounts.from_pairs([0, 5], [1, 9], niches), strength=5.0)
+    with pytest.raises(NichechainError, match=r"T of 71825 states would take 38\.4 GiB as a matrix"):
+        _ = chain.T
+
+
+def test_an_estimate_needs_counts():
+    with pytest.raises(NichechainError, match="counts is of type ndarray, but must be TransitionCounts"):
+        estimate(np.eye(3))

@@ -199,7 +199,7 @@ def test_a_distribution_over_niches_alone_leaves_nothing_outside():
         ({"lineages": 0}, "lineages is 0, but must be at least 1"),
         ({"lineages": -1}, "lineages is -1"),
         ({"lineages": 2.5}, "lineages is 2.5"),
-        ({"method": "exactly"}, "method is 'exactly', but must be one of exact, monte-carlo"),
+        ({"method": "exactly"}, "method is 'exactly', but must be one of auto, exact, monte-carlo"),
         ({"convention": "literal"}, "convention is 'literal', but must be one of definition, procedure"),
         ({"repeats": 0}, "repeats is 0"),
         ({"draws": 0}, "draws is 0"),

@@ -163,11 +163,14 @@ _CALLED = {
     "parent": "(state|parents)",
     "parents": "parent",
     "population": "offspring",
+    "source": "(source|niche)",
     "states": "(niche|lineages)",
     "target": "niche",
+    "root": "(root|niche)",
     "scheme": "(archive|initialisation)",
     "shape": "axes",
     "sizes": "(layer_size|grid|shape)",
+    "trajectories": "(trajectories|state)",
     "transition": "T",
 }
 """What a parameter goes by in messages, where that is not its name."""

@@ -12,6 +12,7 @@ from scipy import sparse
 
 from nichechain import NicheChain, NichechainError
 from nichechain.chain import TransitionCounts
+from nichechain.chain.structure.wormholes import wormholes
 from nichechain.niches import GridNiches
 
 from .table import (
@@ -35,6 +36,7 @@ _THRESHOLD = (-0.1, 1.0, 1.5, *NOT_A_NUMBER)
 _SHARES = ([1.0], [0.5, 0.6, 0, 0, 0, 0], [-1.0, 2.0, 0, 0, 0, 0], [np.nan] * 6, *RAGGED)
 _ROOT = {"niche": _BAD_NICHE, "convention": UNKNOWN, **LINEAGES}
 
+_APART = NicheChain(np.eye(2))
 _NO_POSTERIOR = Made(lambda w: w.given, "no-posterior")
 
 
@@ -66,6 +68,11 @@ CALLS = (
             "posterior": (Made(lambda w: w.estimated.posterior, "two-of-them"),),
         },
     ),
+    Call(
+        "NicheChain",
+        lambda w: {"transition": np.eye(3), "normalize": True},
+        {"transition": ([[1.0, 1.0], [0.0, 0.0]], [[1j, 0], [0, 1]])},
+    ),
     Call("NicheChain.state", lambda w: {"self": w.estimated, "niche": 0}, {"niche": _BAD_NICHE}),
     Call("NicheChain.graph", lambda w: {"self": w.estimated}, {"threshold": SHARE}),
     Call(
@@ -81,6 +88,16 @@ CALLS = (
             "child": ([0], [[0, 1]], [0, 7], [0, -2], [0, 0.5], [0, np.inf], ["a", "b"]),
             "elite": ([0], [0, 0.5], ["a", "b"]),
         },
+    ),
+    Call(
+        "TransitionCounts.from_trajectories",
+        lambda w: {"trajectories": [[0, 1, 2], [3]], "niches": w.niches},
+        {"trajectories": (3, [3], [[0, 7]], [[0.5]], [["a"]], [[[0], [1, 2]]], [[-1, 0]])},
+    ),
+    Call(
+        "TransitionCounts.from_matrix",
+        lambda w: {"matrix": np.eye(7), "niches": w.niches},
+        {"matrix": (np.eye(6), -np.eye(7), 0.5 * np.eye(7), 1j * np.eye(7), np.full((7, 7), 1e18), *RAGGED)},
     ),
     Call(
         "TransitionCounts.from_pairs",
@@ -117,7 +134,7 @@ CALLS = (
     ),
     _at("chain.structure.classes.communicating_classes", threshold=_THRESHOLD),
     _at("chain.structure.classes.recurrent_classes", threshold=_THRESHOLD),
-    _at("chain.structure.classes.betweenness", threshold=SHARE),
+    _at("chain.structure.graph.betweenness", threshold=SHARE),
     _at("chain.structure.graph.reachability_graph", threshold=SHARE),
     Call(
         "chain.structure.passage.hitting_probabilities",
@@ -130,9 +147,53 @@ CALLS = (
         {"target": (*_BAD_NICHE, [], [0, 99], None)},
     ),
     Call(
-        "chain.structure.passage.quasi_stationary_distribution",
+        "chain.structure.quasi_stationary.quasi_stationary_distribution",
         lambda w: {"chain": w.estimated, "states": [0, 1]},
         {"states": (*_BAD_NICHE, [], [0, 99])},
+    ),
+    Call(
+        "chain.structure.stationary.long_run_distribution",
+        lambda w: {"chain": w.estimated, "root": 0},
+        {"root": (*_BAD_NICHE, [], [0, 99], None)},
+    ),
+    *(
+        Call(
+            f"chain.structure.committors.{name}",
+            lambda w: {"chain": w.estimated, "source": 0, "target": [1, 2]},
+            {
+                "source": (*_BAD_NICHE, [], [0, 99], None, 1),
+                "target": (*_BAD_NICHE, [], [1, 99], None, [0, 1]),
+            },
+        )
+        for name in ("committor", "reactive_flux")
+    ),
+    _at("chain.structure.timescales.implied_timescales", k=whole(0)),
+    Call(
+        "chain.structure.metastable.metastable_sets",
+        lambda w: {"chain": _APART, "groups": 2},
+        {"groups": (*whole(1), 3, 1)},
+    ),
+    Call(
+        "chain.structure.intervals.posterior_interval",
+        lambda w: {"chain": w.estimated, "question": lambda chain: chain.states, "draws": 2},
+        {
+            "chain": (_NO_POSTERIOR,),
+            "question": ("how long", 3, None),
+            "draws": whole(1),
+            "level": (0.0, 1.0, 90, *NOT_A_NUMBER),
+            "seed": SEED,
+        },
+    ),
+    Call(
+        "chain.structure.wormholes.wormhole_exposure",
+        lambda w: {"chain": w.estimated, "found": wormholes(w.estimated), "l": 2},
+        {
+            "found": (
+                Made(lambda w: wormholes(w.estimated).drop(columns="child"), "no-column"),
+                Made(lambda w: wormholes(w.estimated).assign(child=99, wormhole=True), "no-state"),
+            ),
+            "l": whole(0),
+        },
     ),
     _at(
         "evolvability.where_to_sample.where_to_sample",

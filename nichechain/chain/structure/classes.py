@@ -1,4 +1,4 @@
-"""What a chain does in the long run: its classes, where lineages settle, how they get about.
+"""Which states lead to one another, where lineages end, and in what rhythm they move there.
 
 All functions take the transition matrix ``chain.T``, which for an estimated chain is the
 posterior mean. A posterior mean has no zeros: every state can follow every other, nothing
@@ -11,32 +11,17 @@ States keep their numbers, the outside state is one of them, and none is ever le
 
 from __future__ import annotations
 
-import importlib
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
-from scipy.sparse.csgraph import connected_components
+from scipy.sparse.csgraph import breadth_first_order, connected_components
 
 from nichechain.chain.model import NicheChain
-from nichechain.chain.structure.linear import solve_substochastic
+from nichechain.chain.structure.transitions import entries_above, graph_of, reachable, rows_of
 from nichechain.core.checks import check_numbers
 from nichechain.core.errors import NichechainError
 
-Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
-
-_WARM_UP = 50
-# Two-step paths of probability 1 would have no length, and paths of no length no number.
-_SHORTEST = 1e-12
-
-
-def transition_entries(chain: NicheChain) -> sparse.csr_array:
-    """T as a sparse matrix (S, S) whose entries are exactly the transitions that can happen."""
-    entries = sparse.csr_array(chain.T, copy=True)
-    entries.eliminate_zeros()
-    return entries
 
 
 def communicating_classes(chain: NicheChain, *, threshold: float = 0.0) -> list[Ints]:
@@ -62,7 +47,7 @@ def communicating_classes(chain: NicheChain, *, threshold: float = 0.0) -> list[
     -----
     The strongly connected components of the graph of transitions (Kemeny and Snell 1960).
     """
-    return _classes(_above(chain, threshold))
+    return classes_of(_above(chain, threshold), chain.states)
 
 
 def recurrent_classes(chain: NicheChain, *, threshold: float = 0.0) -> list[Ints]:
@@ -84,160 +69,85 @@ def recurrent_classes(chain: NicheChain, *, threshold: float = 0.0) -> list[Ints
     NichechainError
         If the threshold is out of range.
     """
-    entries = _above(chain, threshold)
-    return [states for states in _classes(entries) if _closed(entries, states)]
+    return closed_classes_of(_above(chain, threshold), chain.states)
 
 
 def absorbing_niches(chain: NicheChain) -> Ints:
     """States whose children never leave them, (a,): T_ii = 1. The outside state can be one."""
-    entries = transition_entries(chain)
-    alone = np.diff(entries.indptr) == 1
-    absorbing: Ints = np.flatnonzero(alone & (entries.diagonal() > 0)).astype(np.int64)
-    return absorbing
+    alone = [states[0] for states in recurrent_classes(chain) if states.size == 1]
+    return np.array(alone, np.int64)
 
 
-def stationary_distribution(chain: NicheChain) -> Floats:
-    """Share of time that a lineage spends in each state in the end.
-
-    Parameters
-    ----------
-    chain : NicheChain
+def period(chain: NicheChain) -> Ints:
+    """Numbers of generations that a lineage takes from a state back to it have this common divisor.
 
     Returns
     -------
-    (k, S) float64 array
-        One distribution for each of the recurrent classes, in their order: zero outside the
-        class. Any mixture of them is stationary too; from a given start it is weighted by
-        :func:`nichechain.chain.structure.passage.hitting_probabilities` of the classes.
-    """
-    entries = transition_entries(chain)
-    classes = [states for states in _classes(entries) if _closed(entries, states)]
-    found = np.zeros((len(classes), chain.states))
-    for row, states in zip(found, classes, strict=True):
-        row[states] = _stationary(entries[states][:, states])
-    return found
-
-
-def entropy_rate(chain: NicheChain) -> Floats:
-    """Bits of surprise in the niche of the next child, in the end.
-
-    Returns
-    -------
-    (k,) float64 array
-        One rate for each of the recurrent classes, in their order, in bits per generation.
+    (k,) int64 array
+        One period for each of the recurrent classes, in their order: 1 for a class without a
+        rhythm, 2 where lineages alternate between two halves of it, and so on.
 
     Notes
     -----
-    H = −Σ_i π_i Σ_j T_ij log2 T_ij (Shannon 1948).
+    The greatest common divisor of level(i) + 1 − level(j) over all transitions i → j, where a level
+    is the distance from one state of the class (Denardo 1977, "Periods of connected networks").
     """
-    entries = transition_entries(chain)
-    surprise = entries.copy()
-    surprise.data = -entries.data * np.log2(entries.data)
-    rates: Floats = stationary_distribution(chain) @ np.asarray(surprise.sum(axis=1)).ravel()
-    return rates
+    graph = graph_of(rows_of(chain), chain)
+    classes = closed_classes_of(graph, chain.states)
+    return np.array([_period(graph, states, chain.states) for states in classes], np.int64)
 
 
-def betweenness(chain: NicheChain, *, threshold: float = 0.01) -> Floats:
-    """How often a niche lies on the most probable path between two others.
-
-    Parameters
-    ----------
-    chain : NicheChain
-    threshold : float
-        Only transitions at least this probable count, in [0, 1]. Time grows with S times the
-        transitions that are left.
-
-    Returns
-    -------
-    (S,) float64 array
-        Share of ordered pairs of other states whose most probable path passes through, 0 to 1;
-        equally probable paths share a pair. A state that the graph leaves out, or that no path
-        passes through, has 0.
-
-    Raises
-    ------
-    NichechainError
-        If the threshold is not a probability.
-
-    Notes
-    -----
-    Betweenness centrality (Freeman 1977; Brandes 2001) of :meth:`NicheChain.graph` with edges
-    of length −log T_ij, which makes the shortest path the most probable one. Rows without births
-    have no edges there.
-    """
-    import networkx as nx
-
-    graph = chain.graph(threshold)
-    for _, _, edge in graph.edges(data=True):
-        edge["length"] = max(-np.log(edge["probability"]), _SHORTEST)
-    found = np.zeros(chain.states)
-    for state, share in nx.betweenness_centrality(graph, weight="length", normalized=False).items():
-        found[state] = share
-    others = chain.states - 1
-    # All states are counted, those that the graph leaves out too.
-    return found / (others * (others - 1)) if others > 1 else found
+def classes_of(graph: sparse.csr_array, states: int) -> list[Ints]:
+    """Strongly connected parts of the first ``states`` nodes, sorted by their smallest state."""
+    number, label = connected_components(graph, directed=True, connection="strong")
+    return _sorted_parts(label[:states], np.ones(number, bool))
 
 
-def to_deeptime(chain: NicheChain) -> Any:
-    """The chain as a model of the library deeptime, for all else that is known of Markov chains.
-
-    Returns
-    -------
-    deeptime.markov.msm.MarkovStateModel
-        All states, the outside state last where there is one. Much of deeptime refuses a chain of
-        more than one class: hand it a class, or use the functions of this package.
-
-    Raises
-    ------
-    NichechainError
-        If deeptime is not installed.
-    """
-    try:
-        model = importlib.import_module("deeptime.markov.msm").MarkovStateModel
-    except ImportError:
-        raise NichechainError(
-            "deeptime is not installed, but to_deeptime needs it: pip install deeptime"
-        ) from None
-    matrix = chain.T.copy() if isinstance(chain.T, np.ndarray) else sparse.csr_matrix(chain.T, copy=True)
-    return model(matrix)
+def closed_classes_of(graph: sparse.csr_array, states: int) -> list[Ints]:
+    """Those parts that no transition leads out of."""
+    number, label = connected_components(graph, directed=True, connection="strong")
+    entries = graph.tocoo()
+    start, end = label[entries.coords[0]], label[entries.coords[1]]
+    closed = np.ones(number, bool)
+    closed[start[start != end]] = False
+    return _sorted_parts(label[:states], closed)
 
 
 def _above(chain: NicheChain, threshold: float) -> sparse.csr_array:
     check_numbers(threshold=threshold)
     if not 0.0 <= threshold < 1.0:
         raise NichechainError(f"threshold is {threshold}, but must be at least 0 and below 1")
-    entries = transition_entries(chain)
-    entries.data = np.where(entries.data > threshold, entries.data, 0.0)
-    entries.eliminate_zeros()
-    return entries
+    if threshold == 0.0:
+        return graph_of(rows_of(chain), chain)
+    return entries_above(chain, threshold)
 
 
-def _classes(entries: sparse.csr_array) -> list[Ints]:
-    """Strongly connected components, sorted by their smallest state."""
-    number, label = connected_components(entries, directed=True, connection="strong")
-    order = np.argsort(label, kind="stable").astype(np.int64)
-    parts = np.split(order, np.cumsum(np.bincount(label, minlength=number))[:-1])
-    return sorted(parts, key=lambda states: int(states[0]))
+def _sorted_parts(label: NDArray[np.int32], kept: NDArray[np.bool_]) -> list[Ints]:
+    """States of each label that is kept, sorted by the smallest."""
+    states = np.flatnonzero(kept[label])
+    order = states[np.argsort(label[states], kind="stable")].astype(np.int64)
+    ends = np.cumsum(np.bincount(label[states], minlength=kept.size)[kept])[:-1]
+    # A label that only stands for parts of T has no states.
+    parts = [part for part in np.split(order, ends) if part.size]
+    return sorted(parts, key=lambda part: int(part[0]))
 
 
-def _closed(entries: sparse.csr_array, states: Ints) -> bool:
-    """Whether no transition leads out of these states."""
-    return bool(np.isin(entries[states].indices, states).all())
+def _period(graph: sparse.csr_array, states: Ints, size: int) -> int:
+    """Period of a closed class; nodes from ``size`` on are half-way between two generations."""
+    if states.size == 1:
+        return 1
+    # Nothing leads out of the class, so all that is reached from it belongs to it.
+    nodes = reachable(graph, states[:1], graph.shape[0])
+    inner = graph[nodes][:, nodes].tocsr()
+    half = np.where(nodes < size, 1, 0)
+    order, before = breadth_first_order(inner, 0, directed=True)
+    level = np.zeros(nodes.size, np.int64)
+    for node in order[1:]:
+        level[node] = level[before[node]] + _halves(half, before[node], node)
+    start, end = inner.tocoo().coords
+    return int(np.gcd.reduce(np.abs(level[start] + _halves(half, start, end) - level[end]))) // 2
 
 
-def _stationary(inner: sparse.csr_array) -> Floats:
-    """Stationary distribution of an irreducible T, (c,)."""
-    size = inner.shape[0]
-    if size == 1:
-        return np.ones(1)
-    share = np.full(size, 1.0 / size)
-    for _ in range(_WARM_UP):
-        share = 0.5 * (share + share @ inner)
-    # Relative to a state that is often visited, all visits are numbers of moderate size.
-    pivot = int(np.argmax(share))
-    rest = np.delete(np.arange(size), pivot)
-    between = inner[rest][:, rest].T.tocsr()
-    visits = np.ones(size)
-    visits[rest] = np.maximum(solve_substochastic(between, inner[[pivot]].toarray()[0, rest]), 0.0)
-    distribution: Floats = visits / visits.sum()
-    return distribution
+def _halves(state: Ints, start: Ints, end: Ints) -> Ints:
+    """Half generations of a transition: two between states, one into or out of another node."""
+    return np.asarray(state[start] + state[end])

@@ -4,12 +4,17 @@ from __future__ import annotations
 
 import networkx as nx
 import numpy as np
-from scipy import sparse
+from numpy.typing import NDArray
 
 from nichechain.chain.model import NicheChain
+from nichechain.chain.structure.transitions import entries_above, staying
 from nichechain.core.checks import check_numbers
 from nichechain.core.errors import NichechainError
 
+Floats = NDArray[np.float64]
+
+# Two-step paths of probability 1 would have no length, and paths of no length no number.
+_SHORTEST = 1e-12
 LONG_JUMP = 0.25
 """A jump is long if it spans this share of the grid's diagonal."""
 
@@ -41,11 +46,11 @@ def reachability_graph(chain: NicheChain, threshold: float = 0.05) -> nx.DiGraph
     check_numbers(threshold=threshold)
     if not 0.0 <= threshold <= 1.0:
         raise NichechainError(f"threshold is {threshold}, but must be between 0 and 1")
-    transition = sparse.csr_array(chain.T)
-    stay = transition.diagonal()
-    entries = transition.tocoo()
+    stay = staying(chain)
+    # Transitions of the threshold itself belong as well.
+    entries = entries_above(chain, np.nextafter(threshold, -1.0)).tocoo()
     parent, child = entries.coords
-    kept = (entries.data >= threshold) & (parent != child) & (entries.data > 0)
+    kept = parent != child
     parent, child, probability = parent[kept], child[kept], entries.data[kept]
     counts = None if chain.counts is None else chain.counts.matrix
     graph = nx.DiGraph()
@@ -76,3 +81,42 @@ def reachability_graph(chain: NicheChain, threshold: float = 0.05) -> nx.DiGraph
             graph.edges[i, j]["distance"] = float(gap)
             graph.edges[i, j]["long_jump"] = bool(gap >= LONG_JUMP * span)
     return graph
+
+
+def betweenness(chain: NicheChain, *, threshold: float = 0.01) -> Floats:
+    """How often a niche lies on the most probable path between two others.
+
+    Parameters
+    ----------
+    chain : NicheChain
+    threshold : float
+        Only transitions at least this probable count, in [0, 1]. Time grows with S times the
+        transitions that are left.
+
+    Returns
+    -------
+    (S,) float64 array
+        Share of ordered pairs of other states whose most probable path passes through, 0 to 1;
+        equally probable paths share a pair. A state that the graph leaves out, or that no path
+        passes through, has 0.
+
+    Raises
+    ------
+    NichechainError
+        If the threshold is not a probability.
+
+    Notes
+    -----
+    Betweenness centrality (Freeman 1977; Brandes 2001) of :meth:`NicheChain.graph` with edges
+    of length −log T_ij, which makes the shortest path the most probable one. Rows without births
+    have no edges there.
+    """
+    graph = reachability_graph(chain, threshold)
+    for _, _, edge in graph.edges(data=True):
+        edge["length"] = max(-np.log(edge["probability"]), _SHORTEST)
+    found = np.zeros(chain.states)
+    for state, share in nx.betweenness_centrality(graph, weight="length", normalized=False).items():
+        found[state] = share
+    others = chain.states - 1
+    # All states are counted, those that the graph leaves out too.
+    return found / (others * (others - 1)) if others > 1 else found

@@ -7,12 +7,14 @@ from typing import Literal, get_args
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
+from scipy import sparse
 from scipy.special import betaincc
 
 from nichechain.chain.base_measure import BaseMeasure
 from nichechain.chain.counts import TransitionCounts
 from nichechain.chain.model import NicheChain
-from nichechain.core.checks import check_choice, check_numbers
+from nichechain.chain.structure.transitions import rows_of
+from nichechain.core.checks import as_whole, check_at_least, check_choice, check_numbers
 from nichechain.core.errors import NichechainError
 
 Floats = NDArray[np.float64]
@@ -114,6 +116,58 @@ def wormholes(
     # A single hopeless case would fit into a budget of one.
     frame["wormhole"] = (frame["cumulated_false"] <= expected_false) & (frame["exceeds"] > 0.5)
     return frame
+
+
+def wormhole_exposure(chain: NicheChain, found: pd.DataFrame, *, l: int = 1) -> Floats:
+    """Probability that a lineage takes at least one wormhole.
+
+    Parameters
+    ----------
+    chain : NicheChain
+        Not only the one in which they were found: a draw from its posterior as well.
+    found : pandas.DataFrame
+        Columns ``parent``, ``child`` and ``wormhole``, as :func:`wormholes` gives them; rows that are
+        not flagged are left out.
+    l : int
+        Generations, at least 1.
+
+    Returns
+    -------
+    (S,) float64 array
+        For a root in each state.
+
+    Raises
+    ------
+    NichechainError
+        If ``l`` is out of range, a column is missing or names a state that does not exist.
+
+    Notes
+    -----
+    e_k = w + (T − W) e_{k−1} for W the transitions that are wormholes, w their sum in each row of T, and
+    e_0 = 0: the probability that one of them is among the first k steps.
+    """
+    check_at_least(1, l=l)
+    missing = [name for name in ("parent", "child", "wormhole") if name not in found]
+    if missing:
+        raise NichechainError(f"found has no column {missing[0]}, but must be a table of wormholes")
+    flagged = found[found["wormhole"].astype(bool)]
+    parent, child = (as_whole(name, flagged[name]) for name in ("parent", "child"))
+    for state in (*parent.tolist(), *child.tolist()):
+        if not 0 <= state < chain.states:
+            raise NichechainError(f"found names state {state}, but this chain has {chain.states} states")
+    rows = rows_of(chain)
+    start, place = np.unique(parent, return_inverse=True)
+    some = rows[start].toarray() if start.size else np.zeros((0, chain.states))
+    ways = sparse.csr_array((some[place, child], (parent, child)), shape=rows.shape)
+    # Through parts of T, wormholes can only be taken out of the product.
+    others = rows - ways if isinstance(rows, sparse.csr_array) else None
+    taken = np.asarray(ways.sum(axis=1)).ravel()
+    exposure = taken
+    for _ in range(l - 1):
+        onward = rows @ exposure - ways @ exposure if others is None else others @ exposure
+        exposure = taken + onward
+    at_most_one: Floats = np.minimum(exposure, 1.0)
+    return at_most_one
 
 
 def _between_niches(counts: TransitionCounts) -> tuple[Ints, Ints, Ints]:

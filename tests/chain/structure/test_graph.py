@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import numpy as np
@@ -9,7 +10,8 @@ import pytest
 from scipy import sparse
 
 from nichechain import GridNiches, NicheChain, NichechainError, TransitionCounts, estimate
-from nichechain.chain.structure.graph import reachability_graph
+from nichechain.chain.structure import transitions
+from nichechain.chain.structure.graph import betweenness, reachability_graph
 
 # Niches 0 1 2 3 in a row, centres at x = 1, 3, 5, 7, all at y = 0.5; the outside is state 4.
 ROW = GridNiches((4, 1), ((0.0, 8.0), (0.0, 1.0)))
@@ -127,3 +129,66 @@ def test_attributes_are_plain_values_that_can_be_written(tmp_path):
         attributes.pop("position", None)
     nx.write_graphml(graph, tmp_path / "chain.graphml")
     assert nx.read_graphml(tmp_path / "chain.graphml", node_type=int).edges == graph.edges
+
+
+def _most_probable_paths(transition, i, j):
+    """All simple paths from i to j of the largest probability, by enumeration."""
+    best, found = 0.0, []
+    others = [k for k in range(len(transition)) if k not in (i, j)]
+    for size in range(len(others) + 1):
+        for middle in itertools.permutations(others, size):
+            path = (i, *middle, j)
+            probability = np.prod([transition[a, b] for a, b in itertools.pairwise(path)])
+            if probability > best * (1 + 1e-12):
+                best, found = probability, [path]
+            elif probability > 0 and probability > best * (1 - 1e-12):
+                found.append(path)
+    return found
+
+
+def test_betweenness_equals_enumeration_of_paths():
+    rng = np.random.default_rng(4)
+    n = 5
+    transition = rng.dirichlet(np.full(n, 0.5), n)
+    expected = np.zeros(n)
+    for i, j in itertools.permutations(range(n), 2):
+        paths = _most_probable_paths(transition, i, j)
+        for path in paths:
+            expected[list(path[1:-1])] += 1.0 / len(paths)
+    found = betweenness(NicheChain(transition), threshold=0.0)
+    np.testing.assert_allclose(found, expected / ((n - 1) * (n - 2)))
+
+
+def test_betweenness_of_certain_steps_and_of_lonely_states():
+    # A one-way street 0 → 1 → 2 → 3 of certain steps: 1 and 2 lie on two of six ordered pairs of others.
+    street = NicheChain(np.eye(4, k=1) + np.diag([0, 0, 0, 1.0]))
+    np.testing.assert_allclose(betweenness(street), [0.0, 2 / 6, 2 / 6, 0.0])
+    assert betweenness(NicheChain(np.eye(3))).tolist() == [0.0, 0.0, 0.0]
+    assert betweenness(NicheChain([[1.0]])).tolist() == [0.0]
+    with pytest.raises(NichechainError, match="threshold"):
+        betweenness(street, threshold=2.0)
+
+
+def test_betweenness_counts_states_that_the_graph_leaves_out():
+    niches = GridNiches((5,), ((0.0, 1.0),))
+    counts = TransitionCounts.from_births([-1, 0, 1], [0, 1, 2], niches)
+    found = betweenness(estimate(counts, "mle"))
+    # Only the path 0 → 1 → 2 exists, among 5 · 4 ordered pairs of the other five states.
+    assert found.shape == (6,)
+    np.testing.assert_allclose(found, [0, 1 / 20, 0, 0, 0, 0])
+
+
+def test_transitions_above_a_threshold_where_t_is_kept_in_parts(monkeypatch):
+    niches = GridNiches((12, 12), ((0.0, 1.0), (0.0, 1.0)))
+    rng = np.random.default_rng(0)
+    place = rng.random((2000, 2))
+    child = niches.of(place + 0.1 * rng.standard_cauchy((2000, 2)))
+    chain = estimate(TransitionCounts.from_pairs(niches.of(place), child, niches))
+    whole = [transitions.entries_above(chain, t).toarray() for t in (0.003, 0.02, 0.2)]
+    stay = transitions.staying(chain)
+    monkeypatch.setattr(transitions, "_WHOLE", 10)
+    for threshold, expected in zip((0.003, 0.02, 0.2), whole, strict=True):
+        np.testing.assert_allclose(
+            transitions.entries_above(chain, threshold).toarray(), expected, rtol=1e-12
+        )
+    np.testing.assert_allclose(transitions.staying(chain), stay, rtol=1e-12)

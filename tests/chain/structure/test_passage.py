@@ -1,6 +1,8 @@
-"""Hitting, first passage, staying: closed forms, deeptime, dense solutions, simulation-free laws."""
+"""Hitting and first passage: closed forms, exact arithmetic, deeptime, simulation-free laws."""
 
 from __future__ import annotations
+
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -8,14 +10,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import sparse
 
-from nichechain import GridNiches, NicheChain, NichechainError
-from nichechain.chain.structure.passage import (
-    hitting_probabilities,
-    mean_first_passage_times,
-    quasi_stationary_distribution,
-)
+from nichechain import GridNiches, NicheChain, NichechainError, TransitionCounts, estimate
+from nichechain.chain.structure import transitions as rows_
+from nichechain.chain.structure.passage import hitting_probabilities, mean_first_passage_times
 
-from .samples import MIXED, transitions
+from .samples import exact_solution, exact_system, graded, ladder, transitions
 
 
 def _gambler(size, up):
@@ -152,59 +151,73 @@ def test_targets_are_named_like_niches():
             hitting_probabilities(chain, target)
 
 
-def test_quasi_stationary_by_hand():
-    # Of 0 ⇄ 1 in MIXED; 5 only leads in, so nobody who stays long is there.
-    found = quasi_stationary_distribution(NicheChain(MIXED))
-    inner = MIXED[:2, :2]
-    # The larger root of λ² − 0.7 λ − 0.02.
-    survival = (0.7 + np.sqrt(0.49 + 0.08)) / 2
-    assert found.survival == pytest.approx(survival)
-    np.testing.assert_allclose(found.distribution[:2] @ inner, survival * found.distribution[:2])
-    assert found.distribution[2:].tolist() == [0, 0, 0, 0]
-    assert found.distribution.sum() == pytest.approx(1.0)
-    assert found.reason == ""
+def test_a_ladder_that_is_hardly_ever_climbed():
+    """Σ over levels of times from one to the next, in rational arithmetic: 1.7e19, no negative number."""
+    chain = NicheChain(ladder(20, 0.1))
+    up, down = Fraction(0.1), Fraction(0.9)
+    step, total = Fraction(0), Fraction(0)
+    for _ in range(20):
+        step = (1 + down * step) / up
+        total += step
+    assert float(total) == pytest.approx(1.7096717051798807e19, rel=1e-15)
+    assert mean_first_passage_times(chain, 20)[0] == pytest.approx(float(total), rel=1e-14)
 
 
-def test_quasi_stationary_downstream():
-    # 0 is left slowly into 1, which is left fast: v_1 = 0.5 · 0.9 / (0.9 − 0.2) relative to v_0.
-    chain = NicheChain([[0.9, 0.05, 0.05], [0.0, 0.2, 0.8], [0.0, 0.0, 1.0]])
-    found = quasi_stationary_distribution(chain)
-    ratio = 0.05 / (0.9 - 0.2)
-    np.testing.assert_allclose(found.distribution, [1 / (1 + ratio), ratio / (1 + ratio), 0.0])
-    assert found.survival == pytest.approx(0.9)
+@pytest.mark.parametrize("top", [300, 5000, 72_000])
+def test_long_ladders(top):
+    # From level i to the next it takes Σ (q/p)^k / p for k = 0 … i.
+    up = 0.51
+    times = mean_first_passage_times(NicheChain(ladder(top, up)), top)
+    odds = (1 - up) / up
+    level = np.arange(top)
+    steps = (1 - odds ** (level + 1)) / (up * (1 - odds))
+    np.testing.assert_allclose(times[:-1], np.cumsum(steps[::-1])[::-1], rtol=1e-9)
 
 
-@pytest.mark.parametrize("size", [2, 9, 200, 801])
-def test_quasi_stationary_of_a_walk_between_two_traps(size):
-    # A fair walk on 1 … size between absorbing ends: cos(π/(size + 1)) and a sine; it is periodic.
-    found = quasi_stationary_distribution(_gambler(size + 2, 0.5))
-    assert found.survival == pytest.approx(np.cos(np.pi / (size + 1)), rel=1e-10)
-    sine = np.sin(np.pi * np.arange(size + 2) / (size + 1))
-    np.testing.assert_allclose(found.distribution, sine / sine.sum(), atol=1e-8 / size)
+@pytest.mark.parametrize("top", [400, 3000])
+def test_a_time_beyond_floating_point_is_refused(top):
+    with pytest.raises(NichechainError, match=r"(1e308|underflow|below 1e-308)"):
+        mean_first_passage_times(NicheChain(ladder(top, 0.1)), top)
 
 
-def test_quasi_stationary_where_there_is_none():
-    ergodic = quasi_stationary_distribution(NicheChain(np.full((3, 3), 1 / 3)))
-    assert np.isnan(ergodic.distribution).all()
-    assert np.isnan(ergodic.survival)
-    assert "no state is transient" in ergodic.reason
-    street = quasi_stationary_distribution(NicheChain([[0, 1.0, 0], [0, 0, 1.0], [0, 0, 1.0]]))
-    assert street.survival == 0.0
-    assert "within a few generations" in street.reason
-    twins = quasi_stationary_distribution(NicheChain([[0.5, 0, 0.5], [0, 0.5, 0.5], [0, 0, 1.0]]))
-    assert np.isnan(twins.distribution).all()
-    assert twins.survival == 0.5
-    assert "2 parts" in twins.reason
+def test_two_steps_that_hardly_ever_happen():
+    e = 1e-9
+    slow = NicheChain([[1 - e, e, 0], [1 - e, 0, e], [0, 0, 1]])
+    assert mean_first_passage_times(slow, 2)[0] == pytest.approx(1.000000001e18, rel=1e-15)
 
 
-def test_quasi_stationary_of_chosen_states():
-    transition = np.array([[0.5, 0.25, 0.25], [0.1, 0.6, 0.3], [0.2, 0.2, 0.6]])
-    chain = NicheChain(transition)
-    found = quasi_stationary_distribution(chain, [0, 1])
-    inner = transition[:2, :2]
-    assert found.survival == pytest.approx(max(np.linalg.eigvals(inner).real))
-    np.testing.assert_allclose(found.distribution[:2] @ inner, found.survival * found.distribution[:2])
-    # All states are never left: the stationary distribution.
-    whole = quasi_stationary_distribution(chain, [0, 1, 2])
-    assert whole.survival == pytest.approx(1.0)
-    np.testing.assert_allclose(whole.distribution @ transition, whole.distribution)
+@given(graded(), st.data())
+@settings(max_examples=60, deadline=None)
+def test_every_entry_is_right(transition, data):
+    """Probabilities from 1 to 1e-30 in one matrix, against rational arithmetic on the same floats."""
+    size = len(transition)
+    target = data.draw(st.integers(0, size - 1))
+    rest = [i for i in range(size) if i != target]
+    exact = exact_solution(exact_system(transition, rest), [Fraction(1)] * len(rest))
+    found = mean_first_passage_times(NicheChain(transition), target)
+    np.testing.assert_allclose(found[rest], [float(x) for x in exact], rtol=1e-12)
+    if size == 2:
+        return
+    # The target competes with a trap.
+    trap = rest[0]
+    trapped = transition.copy()
+    trapped[trap] = np.eye(size)[trap]
+    others = rest[1:]
+    right = [Fraction(float(transition[i, target])) for i in others]
+    exact = exact_solution(exact_system(trapped, others), right)
+    found = hitting_probabilities(NicheChain(trapped), target)
+    np.testing.assert_allclose(found[others], [float(x) for x in exact], rtol=1e-12)
+    assert found.max() <= 1.0
+
+
+def test_a_posterior_mean_in_parts_answers_alike(monkeypatch):
+    niches = GridNiches((12, 12), ((0.0, 1.0), (0.0, 1.0)), "absorb")
+    rng = np.random.default_rng(0)
+    pairs = rng.integers(niches.states, size=(2, 4000))
+    chain = estimate(TransitionCounts.from_pairs(*pairs, niches), strength=5.0)
+    target = [3, 70]
+    hit, times = hitting_probabilities(chain, target), mean_first_passage_times(chain, 144)
+    monkeypatch.setattr(rows_, "_WHOLE", 10)
+    np.testing.assert_allclose(hitting_probabilities(chain, target), hit, atol=1e-8)
+    np.testing.assert_allclose(mean_first_passage_times(chain, 144), times, rtol=1e-8)
+    assert np.isinf(mean_first_passage_times(chain, target)).sum() == 145 - 2

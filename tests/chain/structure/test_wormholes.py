@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
+import pandas as pd
 import pytest
-from scipy import stats
+from scipy import sparse, stats
 
 from nichechain import GridNiches, NicheChain, NichechainError, TransitionCounts, estimate
-from nichechain.chain.structure.wormholes import wormholes
+from nichechain.chain.structure import transitions
+from nichechain.chain.structure.wormholes import wormhole_exposure, wormholes
 
 GRID = GridNiches((6, 5), ((0.0, 6.0), (0.0, 10.0)))
 JUMP = (2, 27)
@@ -159,3 +163,48 @@ def test_only_estimated_chains_have_wormholes():
     for chain in (NicheChain(np.eye(2)), estimate(_births(np.random.default_rng(7)), "mle")):
         with pytest.raises(NichechainError, match="need a chain with a posterior"):
             wormholes(chain)
+
+
+def test_exposure_by_enumeration():
+    """All lineages of three generations on four niches, of which two transitions are wormholes."""
+    transition = np.random.default_rng(2).dirichlet(np.ones(4), 4)
+    found = pd.DataFrame({"parent": [0, 2, 1], "child": [3, 0, 2], "wormhole": [True, True, False]})
+    ways = {(0, 3), (2, 0)}
+    expected = np.zeros(4)
+    for lineage in itertools.product(range(4), repeat=4):
+        steps = list(itertools.pairwise(lineage))
+        if ways & set(steps):
+            expected[lineage[0]] += np.prod([transition[step] for step in steps])
+    for form in (np.array, sparse.csr_array):
+        chain = NicheChain(form(transition))
+        np.testing.assert_allclose(wormhole_exposure(chain, found, l=3), expected, rtol=1e-13)
+    np.testing.assert_allclose(
+        wormhole_exposure(chain, found), [transition[0, 3], 0, transition[2, 0], 0], rtol=1e-15
+    )
+    none = found.assign(wormhole=False)
+    assert wormhole_exposure(chain, none, l=3).tolist() == [0, 0, 0, 0]
+
+
+def test_exposure_where_t_is_kept_in_parts(monkeypatch):
+    niches = GridNiches((12, 12), ((0.0, 1.0), (0.0, 1.0)))
+    pairs = np.random.default_rng(0).integers(niches.states, size=(2, 2000))
+    chain = estimate(TransitionCounts.from_pairs(*pairs, niches), strength=5.0)
+    found = pd.DataFrame({"parent": pairs[0], "child": pairs[1], "wormhole": True}).drop_duplicates()
+    whole = wormhole_exposure(chain, found, l=4)
+    monkeypatch.setattr(transitions, "_WHOLE", 10)
+    np.testing.assert_allclose(wormhole_exposure(chain, found, l=4), whole, rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("found", "message"),
+    [
+        (pd.DataFrame({"parent": [0], "child": [1]}), "no column wormhole"),
+        (
+            pd.DataFrame({"parent": [0], "child": [9], "wormhole": [True]}),
+            "state 9, but this chain has 3 states",
+        ),
+    ],
+)
+def test_tables_that_name_no_wormholes(found, message):
+    with pytest.raises(NichechainError, match=message):
+        wormhole_exposure(NicheChain(np.eye(3)), found)

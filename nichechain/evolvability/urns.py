@@ -1,0 +1,285 @@
+"""l-evolvability of estimated chains whatever their size: lineages that draw rows of T as they need them.
+
+A row of T that is Dirichlet(C + s B) need not be drawn to draw children from it. Given k children so far, the
+next is one of the C births with weight C, a copy of one of the k with weight k, or a new one from B with
+weight s: Pólya's urn (Blackwell and MacQueen 1973). So all lineages of a root live on the same T, of which
+only those rows come to be that they enter. Cost follows descendants, not niches, and no row is cut short.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from nichechain.core.randomness import Purpose, keyed
+
+if TYPE_CHECKING:
+    from nichechain.chain.posterior import DirichletPosterior
+    from nichechain.evolvability.question import Question
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+# Lineages of a root are 2 to 40 times as many as are asked for: halves tell the noise, more lower it.
+# Descendants of all roots up to which a draw has more.
+_WORTHWHILE = 200_000
+# Descendants that are kept at once.
+_DESCENDANTS = 4_000_000
+_ABSENT = -1
+
+
+@dataclass(frozen=True)
+class Simulated:
+    """Coverage of m roots on D draws of T, each by simulated lineages.
+
+    Parameters
+    ----------
+    coverage : (D, m, k) float64 array
+        Unbiased estimates of the niches that U lineages visit, for k numbers U.
+    noise : (D, m, k) float64 array
+        Estimates of their variance given T.
+    """
+
+    coverage: Floats
+    noise: Floats
+
+    def summary(self, size: int = 0) -> tuple[Floats, Floats, Floats, Floats]:
+        """Mean over the draws, its standard error, and 5 % and 95 % quantiles, (m,) each.
+
+        Parameters
+        ----------
+        size : int
+            Which of the k numbers of lineages.
+
+        Notes
+        -----
+        Simulation widens the spread over draws by its own variance, which is known. Quantiles are drawn in
+        towards the mean by the ratio of the standard deviations without and with it. Few draws tell
+        that ratio badly where simulation is most of the spread: then it is at least half that of all
+        roots together, and half of its own standard error.
+        """
+        drawn, noise = self.coverage[:, :, size], self.noise[:, :, size].mean(axis=0)
+        mean = drawn.mean(axis=0)
+        if len(drawn) == 1:
+            return mean, np.sqrt(noise), mean, mean
+        spread = drawn.var(axis=0, ddof=1)
+        own = 1.0 - noise / np.maximum(spread, 1e-300)
+        together = 1.0 - noise.mean() / max(spread.mean(), 1e-300)
+        least = max(0.5 * together, 0.5 * math.sqrt(2.0 / (len(drawn) - 1)), 0.0)
+        kept = np.sqrt(np.clip(own, min(least, 1.0), 1.0))
+        low, high = np.quantile(drawn, (0.05, 0.95), axis=0, method="weibull")
+        return mean, np.sqrt(spread / len(drawn)), mean + kept * (low - mean), mean + kept * (high - mean)
+
+
+def simulated_coverage(
+    posterior: DirichletPosterior,
+    question: Question,
+    sizes: list[int],
+    *,
+    roots: Ints | None = None,
+    offspring: Floats | None = None,
+    tell: Callable[[int], None] | None = None,
+) -> Simulated:
+    """Coverage of lineages on draws of T that are made as they are needed.
+
+    Parameters
+    ----------
+    posterior : DirichletPosterior
+    question : Question
+        Generations, convention, draws and seed.
+    sizes : list of int
+        Numbers U of lineages, each at least 1.
+    roots : (m,) int64 array, optional
+        States that roots stand in.
+    offspring : (S,) float64 array, optional
+        D: where the children of a single root are. Give either this or ``roots``.
+    tell : callable, optional
+        Told how many draws are done.
+
+    Returns
+    -------
+    Simulated
+
+    Notes
+    -----
+    Of M ≥ 2 U simulated lineages, U are drawn without replacement in expectation (Hurlbert 1971), which
+    is unbiased for U lineages on the same T. Draw d comes from ``keyed(seed, Purpose.WALKS, d)``; roots
+    have draws of their own.
+    """
+    m = 1 if roots is None else roots.size
+    counts_first = roots is None or question.root_counts
+    moves = question.steps - counts_first
+    lineages = max(sizes) * int(np.clip(_WORTHWHILE // (m * question.steps * max(sizes)), 2, 40))
+    at_once = max(1, _DESCENDANTS // (lineages * (moves + 1)))
+    coverage = np.empty((question.draws, m, len(sizes)))
+    noise = np.empty_like(coverage)
+    for draw in range(question.draws):
+        rng = keyed(question.seed, Purpose.WALKS, draw)
+        urns = _Urns(posterior.settled(keyed(question.seed, Purpose.POSTERIOR, draw)))
+        for start in range(0, m, at_once):
+            block = slice(start, min(start + at_once, m))
+            if roots is None:
+                assert offspring is not None
+                first = rng.choice(offspring.size, (1, lineages), p=offspring / offspring.sum())
+            else:
+                first = np.repeat(roots[block], lineages).reshape(-1, lineages)
+            states = urns.walks(first.astype(np.int64), moves, rng)
+            coverage[draw, block], noise[draw, block] = _covered(
+                states[:, 0 if counts_first else lineages :], lineages, sizes, urns.niches
+            )
+        if tell is not None:
+            tell(draw + 1)
+    return Simulated(coverage, noise)
+
+
+class _Urns:
+    """Rows of T as urns."""
+
+    def __init__(self, posterior: DirichletPosterior) -> None:
+        self.niches = len(posterior.counts.niches)
+        self._base, self._strength = posterior.base, posterior.strength
+        weights = posterior.weights
+        self._start, self._column = weights.indptr.astype(np.int64), weights.indices.astype(np.int64)
+        self._upto = np.concatenate([[0.0], np.cumsum(weights.data)])
+        self._stays = weights.shape[0] - 1 if posterior.absorbing else _ABSENT
+
+    def walks(self, first: Ints, moves: int, rng: np.random.Generator) -> Ints:
+        """States of lineages of some roots (g, M), generation after generation: (g, (moves + 1) M)."""
+        g, lineages = first.shape
+        states = np.empty((g, (moves + 1) * lineages), np.int64)
+        states[:, :lineages] = first
+        tables = self._start, self._column, self._upto, self._strength, self._stays
+        for move in range(moves):
+            origin = np.empty((g, lineages), np.int64)
+            _choose(*tables, states, move * lineages, rng.random((g, lineages)), origin)
+            new = origin == _ABSENT
+            here = states[:, move * lineages : (move + 1) * lineages]
+            fresh = np.empty((g, lineages), np.int64)
+            fresh[new] = self._base.sample(here[new], rng)
+            _resolve(origin, fresh, states, (move + 1) * lineages)
+        return states
+
+
+@numba.njit(nogil=True, cache=True)
+def _choose(
+    start: Any,
+    column: Any,
+    upto: Any,
+    strength: Any,
+    stays: Any,
+    states: Any,
+    done: Any,
+    uniform: Any,
+    origin: Any,
+) -> None:
+    """Where each child of the generation that begins at ``done`` comes from.
+
+    -1: from the base measure; -2 - j: as a birth in state j; else a copy of the child of the visit of
+    that number.
+    """
+    g, lineages = uniform.shape
+    size = start.size - 1
+    last, times = np.full(size, -1), np.zeros(size, np.int64)
+    before = np.empty(done + lineages, np.int64)
+    for root in range(g):
+        for visit in range(done):
+            state = states[root, visit]
+            before[visit] = last[state]
+            last[state] = visit
+            times[state] += 1
+        for k in range(lineages):
+            visit = done + k
+            state = states[root, visit]
+            if state == stays:
+                origin[root, k] = -2 - state
+                continue
+            begin, end = start[state], start[state + 1]
+            known = upto[end] - upto[begin]
+            place = uniform[root, k] * (strength + known + times[state])
+            if place < known:
+                at = begin + np.searchsorted(upto[begin + 1 : end + 1], upto[begin] + place, "right")
+                origin[root, k] = -2 - column[min(at, end - 1)]
+            elif place < known + times[state]:
+                back = min(np.int64(place - known), times[state] - 1)
+                at = last[state]
+                for _ in range(back):
+                    at = before[at]
+                origin[root, k] = at
+            else:
+                origin[root, k] = -1
+            before[visit] = last[state]
+            last[state] = visit
+            times[state] += 1
+        for visit in range(done + lineages):
+            state = states[root, visit]
+            last[state] = -1
+            times[state] = 0
+
+
+@numba.njit(nogil=True, cache=True)
+def _resolve(origin: Any, fresh: Any, states: Any, done: Any) -> None:
+    """The children: that of visit v is in place v + M, M after its parent."""
+    g, lineages = origin.shape
+    for root in range(g):
+        for k in range(lineages):
+            source = origin[root, k]
+            if source == -1:
+                states[root, done + k] = fresh[root, k]
+            elif source < -1:
+                states[root, done + k] = -2 - source
+            else:
+                states[root, done + k] = states[root, source + lineages]
+
+
+def _covered(states: Ints, lineages: int, sizes: list[int], niches: int) -> tuple[Floats, Floats]:
+    """Niches visited by U of M lineages, and its variance as two halves tell it: (g, k) each."""
+    half = lineages // 2
+    tables = [np.stack([_hit(whole, size) for size in sizes]) for whole in (lineages, half, lineages - half)]
+    whole, first, second = _count(states, lineages, half, niches, *tables)
+    return whole, (first - second) ** 2 / 4.0
+
+
+def _hit(lineages: int, size: int) -> Floats:
+    """P(one of c among M is among U drawn without replacement), for c from 0 to M."""
+    missed = np.arange(lineages)
+    left = np.maximum(lineages - size - missed, 0) / (lineages - missed)
+    return np.concatenate([[0.0], 1.0 - np.cumprod(left)])
+
+
+@numba.njit(nogil=True, cache=True)
+def _count(states: Any, lineages: Any, half: Any, niches: Any, whole: Any, early: Any, late: Any) -> Any:
+    g, visits = states.shape
+    sizes = whole.shape[0]
+    found = np.zeros((3, g, sizes))
+    seen = np.full(niches, -1)
+    number = np.zeros((niches, 2), np.int64)
+    places = np.empty(visits, np.int64)
+    for root in range(g):
+        used = 0
+        for lineage in range(lineages):
+            side = 0 if lineage < half else 1
+            for visit in range(lineage, visits, lineages):
+                state = states[root, visit]
+                if state >= niches or seen[state] == lineage:
+                    continue
+                seen[state] = lineage
+                if number[state, 0] + number[state, 1] == 0:
+                    places[used] = state
+                    used += 1
+                number[state, side] += 1
+        for place in range(used):
+            state = places[place]
+            a, b = number[state]
+            for k in range(sizes):
+                found[0, root, k] += whole[k, a + b]
+                found[1, root, k] += early[k, a]
+                found[2, root, k] += late[k, b]
+            number[state] = 0
+            seen[state] = -1
+    return found[0], found[1], found[2]

@@ -1,0 +1,121 @@
+"""Lineages on rows that are drawn where they are entered."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.special import gammaln
+
+from nichechain.chain import TransitionCounts, estimate
+from nichechain.evolvability import l_evolvability, niche_evolvability
+from nichechain.evolvability.coverage import rarefied_coverage
+from nichechain.evolvability.niches import answer_for_niches
+from nichechain.evolvability.question import MOST_EXACT, Question
+from nichechain.evolvability.urns import Simulated, simulated_coverage
+from nichechain.niches import GridNiches
+
+_BOUNDS = ((0.0, 1.0), (0.0, 1.0))
+
+
+def _counts(side=4, births=60, outside="state", seed=0):
+    niches = GridNiches((side, side), _BOUNDS, outside)
+    rng = np.random.default_rng(seed)
+    parent = rng.integers(side * side // 2, size=births)
+    child = np.minimum(rng.poisson(0.7 * parent + 2), niches.states - 1)
+    return TransitionCounts.from_births(parent, child, niches)
+
+
+def _posterior(counts, strength=3.0):
+    return estimate(counts, strength=strength).posterior
+
+
+@pytest.mark.parametrize("strength", [0.4, 5.0, 200.0])
+def test_one_generation_equals_the_dirichlet_multinomial(strength):
+    counts, lineages = _counts(), 7
+    posterior = _posterior(counts, strength)
+    roots = np.array([0, 3, 15])
+    found = simulated_coverage(
+        posterior, Question(l=1, draws=400, lineages=lineages), [lineages], roots=roots
+    )
+    alpha = posterior.weights.toarray()[roots] + strength * posterior.base.rows(roots)
+    other = alpha.sum(axis=1, keepdims=True) - alpha
+    whole = other + alpha
+    missed = np.exp(gammaln(other + lineages) - gammaln(other) + gammaln(whole) - gammaln(whole + lineages))
+    value, error, *_ = found.summary()
+    np.testing.assert_array_less(np.abs(value - (1.0 - missed)[:, :16].sum(axis=1)), 4 * error)
+
+
+@pytest.mark.parametrize("convention", ["definition", "procedure"])
+@pytest.mark.parametrize("outside", ["state", "absorb", "clip"])
+def test_equals_the_closed_form_over_draws(convention, outside):
+    chain = estimate(_counts(outside=outside), strength=3.0)
+    question = Question(l=4, lineages=9, convention=convention, draws=400)
+    exact = niche_evolvability(chain, l=4, lineages=9, convention=convention, draws=400, method="exact")
+    found = simulated_coverage(chain.posterior, question, [9, 2], roots=np.arange(16))
+    value, error, low, high = found.summary()
+    z = (value - exact.value) / np.hypot(error, exact.standard_error)
+    assert np.abs(z).max() < 4.5
+    np.testing.assert_allclose((high - low).mean(), (exact.high - exact.low).mean(), rtol=0.1)
+    few = niche_evolvability(chain, l=4, lineages=2, convention=convention, draws=400, method="exact")
+    value, error, *_ = found.summary(1)
+    assert (np.abs(value - few.value) < 4.5 * np.hypot(error, few.standard_error)).all()
+
+
+def test_offspring_begin_where_they_are():
+    chain = estimate(_counts(), strength=3.0)
+    share = np.zeros(17)
+    share[[2, 9]] = 0.25, 0.75
+    question = Question(l=3, lineages=6, draws=400)
+    found = simulated_coverage(chain.posterior, question, [6], offspring=share)
+    exact = l_evolvability(chain, offspring=share, l=3, lineages=6, draws=400, method="exact")
+    value, error, *_ = found.summary()
+    assert abs(value[0] - exact.value) < 4 * np.hypot(error[0], exact.standard_error)
+
+
+def test_as_many_lineages_as_there_are_count_as_they_are():
+    # Of all M lineages, M are drawn: rarefaction changes nothing.
+    from nichechain.evolvability.urns import _count, _hit
+
+    states = np.array([[0, 1, 1, 2, 2, 1, 5, 2]])  # two generations of four lineages; 5 is no niche
+    tables = [np.stack([_hit(m, u) for u in (1, 2)]) for m in (4, 2, 2)]
+    whole, first, second = _count(states, 4, 2, 5, *tables)
+    # Lineages visit {0, 2}, {1}, {1, 5} and {2}.
+    assert whole[0, 0] == pytest.approx((2 + 1 + 1 + 1) / 4)
+    assert whole[0, 1] == pytest.approx(np.mean([3, 3, 2, 2, 2, 1 + 1]))
+    assert (first[0, 1], second[0, 1]) == (3, 2)
+    assert _hit(4, 2)[1] == pytest.approx(rarefied_coverage([1, 3], 2) - 1.0)
+
+
+def test_simulation_does_not_widen_the_interval():
+    rng = np.random.default_rng(0)
+    truth = rng.normal(50.0, 3.0, (4000, 2, 1))
+    noisy = truth + rng.normal(0.0, 4.0, truth.shape)
+    low, high = Simulated(noisy, np.full(truth.shape, 16.0)).summary()[2:]
+    np.testing.assert_allclose(high - low, 2 * 1.645 * 3.0, rtol=0.06)
+
+
+def test_the_number_of_states_decides_by_default():
+    side = 32
+    assert side**2 > MOST_EXACT
+    few, many = estimate(_counts()), estimate(_counts(side, 300))
+    assert niche_evolvability(few, l=2, lineages=5, draws=2).method == "exact"
+    roots = np.array([3, 7])
+    found = answer_for_niches(many, Question(l=2, lineages=5, draws=3), roots=roots)
+    assert found.method == "urns"
+    assert np.flatnonzero(np.isfinite(found.value)).tolist() == roots.tolist()
+    assert l_evolvability(many, niche=3, l=2, lineages=5, draws=3).method == "urns"
+    exact = replace(Question(l=2, lineages=5, draws=3), method="exact")
+    assert answer_for_niches(many, exact, roots=roots).method == "exact"
+
+
+def test_scores_of_some_niches_are_those_of_all():
+    chain = estimate(_counts())
+    question = Question(l=3, lineages=5, draws=4)
+    every, some = (
+        answer_for_niches(chain, question),
+        answer_for_niches(chain, question, roots=np.array([1, 8])),
+    )
+    np.testing.assert_allclose(some.value[[1, 8]], every.value[[1, 8]], rtol=1e-13)
+    assert np.isnan(some.value[0])
