@@ -142,7 +142,7 @@ class PlainChain:
             rng = np.random.default_rng([seed, number])
             matrix = _dense(chain.T if chain.posterior is None else chain.posterior.draw(rng))
             rows = matrix[roots.niche]
-            strength = 1.0 if chain.posterior is None else chain.posterior.strength
+            strength = 1.0 if chain.posterior is None else chain.posterior.elite_concentration
             firsts = [rows]
             for start in ("elite", "genotype"):
                 weight = rng.standard_gamma(known[start] + strength * rows)

@@ -13,8 +13,7 @@ from nichechain.core.lazy import lazily
 
 if TYPE_CHECKING:
     from nichechain import domains, landscape, studies, variation, walks
-    from nichechain.archive import Archive, Elite, load
-    from nichechain.archive.building import build
+    from nichechain.archive import Archive, Elite, build, calibrate, load
     from nichechain.chain import NicheChain, TransitionCounts, estimate
     from nichechain.core import ArchiveError, NichechainError
     from nichechain.evolvability import (
@@ -52,6 +51,7 @@ __all__ = [
     "Verification",
     "bootstrap_elites",
     "build",
+    "calibrate",
     "curiosity",
     "domains",
     "estimate",
@@ -73,7 +73,7 @@ __all__ = [
 # NumPy, SciPy and pandas take half a second.
 __getattr__, __dir__ = lazily(
     __name__,
-    archive="Archive Elite build load",
+    archive="Archive Elite build calibrate load",
     chain="NicheChain TransitionCounts estimate",
     core="ArchiveError NichechainError",
     domains="domains",

@@ -1,7 +1,8 @@
 """An archive is a folder: elites, births, and what made them."""
 
 from nichechain.archive.archive import Archive, Elite, load, shipped
-from nichechain.archive.building import BuildProgress, build
+from nichechain.archive.building import build
+from nichechain.archive.calibrating import calibrate
 from nichechain.archive.exports import (
     genealogy,
     write_dot,
@@ -12,6 +13,7 @@ from nichechain.archive.exports import (
     write_phylogeny,
     write_stn,
 )
+from nichechain.archive.filling import BuildProgress
 from nichechain.archive.imported import Axes, Columns, import_births
 from nichechain.archive.merge import merge
 
@@ -22,6 +24,7 @@ __all__ = [
     "Columns",
     "Elite",
     "build",
+    "calibrate",
     "genealogy",
     "import_births",
     "load",

@@ -197,11 +197,16 @@ class Archive:
         return self.counts_of()
 
     def counts_of(
-        self, *, run: int | None = None, steps: tuple[int, int] | None = None, accepted: bool = False
+        self,
+        *,
+        run: int | None = None,
+        steps: tuple[int, int] | None = None,
+        accepted: bool = False,
+        lineages: bool | None = None,
     ) -> TransitionCounts:
         """Some of the births from niche to niche, see :func:`nichechain.chain.filters.counts_of`."""
         births = read.read_births(self.folder, self.meta)
-        return counts_of(births, self.niches, run=run, steps=steps, accepted=accepted)
+        return counts_of(births, self.niches, run=run, steps=steps, accepted=accepted, lineages=lineages)
 
     def chain(self, estimator: str = "empirical-bayes", **options: Any) -> NicheChain:
         """The Markov chain over niches, estimated from all births.

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import time
 import warnings
 from collections.abc import Callable
-from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +12,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from nichechain.archive import read, write
+from nichechain.archive.filling import BuildProgress, Filling, count
 from nichechain.births.table import NONE
 from nichechain.core.errors import ArchiveError
 from nichechain.core.files import writing
@@ -26,29 +25,6 @@ from nichechain.search.failures import Failures, check_first_batch
 from nichechain.search.making import make_domain, make_mutation, make_niches
 from nichechain.search.map_elites import MapElites
 from nichechain.search.parents import CuriosityScores
-
-CHECKPOINT_SECONDS = 30.0
-_COMMIT_SHARE = 0.01
-
-
-@dataclass(frozen=True)
-class BuildProgress:
-    """How far a build is.
-
-    Parameters
-    ----------
-    births : int
-        Evaluated so far, those of the batch under way among them.
-    filled : int
-        Niches with an elite.
-    outside, failed : int
-        Births out of bounds, and births whose evaluation failed.
-    """
-
-    births: int
-    filled: int
-    outside: int
-    failed: int
 
 
 def build(
@@ -101,6 +77,11 @@ def build(
             meta = read.read_meta(folder)
             if meta.origin is not None:
                 raise ArchiveError(f"{folder} was {meta.origin['kind']}, so no build can go on with it")
+            if meta.calibrations:
+                raise ArchiveError(
+                    f"{folder} has {meta.births - meta.built} births of a calibration, so no build can go on "
+                    "with it: build as far as you want, then calibrate"
+                )
             _check_continues(meta.config, config, meta.births, folder)
             niches = read.read_niches(folder, meta)
             state = read.read_state(folder, meta)
@@ -108,7 +89,7 @@ def build(
             rows = read.read_births(folder, meta, None if curious else ["child_niche", "failed"])
             if curious:
                 scores = CuriosityScores.of_births(rows)
-            outside = _count(rows, len(niches))
+            outside = count(rows, len(niches))
             failures.count(rows)
             del rows
         else:
@@ -118,51 +99,17 @@ def build(
         writer = write.Writer(folder, config, read.DomainFacts.of(domain), niches=niches)
 
         first_look = FirstLook(len(niches), search.births)
-        under_way = 0
 
-        def tell(done: int = 0) -> None:
-            nonlocal under_way
-            under_way += done
-            if on_progress is not None:
-                on_progress(BuildProgress(search.births + under_way, search.filled, outside, failures.failed))
+        def look(rows: pa.Table) -> None:
+            if len(rows) == search.births:
+                check_first_batch(rows, domain, config.seed)
+            note = first_look.tell(*_landed(rows), last=search.births >= config.evaluations)
+            if note is not None:
+                # Of whoever called build(), with Filling between.
+                warnings.warn(note, stacklevel=4)
 
-        def commit() -> None:
-            writer.commit(search.state)
-            # Of no consequence where it cannot be written.
-            with suppress(OSError):
-                savings.write(folder, search.savings)
-
-        last_commit = time.monotonic()
-        pause = CHECKPOINT_SECONDS
-        tell()
-        try:
-            while search.births < config.evaluations:
-                failures.check(
-                    f"{folder} keeps them, and a build with a larger max_failed goes on from there"
-                )
-                first = search.births == 0
-                rows = search.advance(executor, config.evaluations - search.births, tell)
-                under_way = 0
-                if first:
-                    check_first_batch(rows, domain, config.seed)
-                writer.append(rows)
-                outside += _count(rows, len(niches))
-                failures.count(rows)
-                note = first_look.tell(*_landed(rows), last=search.births >= config.evaluations)
-                if note is not None:
-                    warnings.warn(note, stacklevel=2)
-                tell()
-                if time.monotonic() - last_commit > pause:
-                    began = time.monotonic()
-                    commit()
-                    last_commit = time.monotonic()
-                    # Many large genotypes take a while to write.
-                    pause = max(CHECKPOINT_SECONDS, (last_commit - began) / _COMMIT_SHARE)
-        finally:
-            # An interrupt between two halves of a step leaves nothing to commit; the last commit
-            # is at most half a minute old.
-            if search.settled and search.births == writer.births > 0:
-                commit()
+        filling = Filling(folder, search, writer, failures, outside, len(niches), on_progress)
+        filling.go(config.evaluations, executor, look)
 
 
 def _landed(rows: pa.Table) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
@@ -170,10 +117,6 @@ def _landed(rows: pa.Table) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     axes = [name for name in rows.column_names if name.startswith("behavior_")]
     behavior = np.stack([rows[name].fill_null(np.nan).to_numpy() for name in axes], axis=1)
     return behavior, rows["child_niche"].fill_null(NONE).to_numpy()
-
-
-def _count(rows: pa.Table, state: int) -> int:
-    return int(np.count_nonzero(rows["child_niche"].to_numpy() == state))
 
 
 def _check_continues(old: BuildConfig, new: BuildConfig, births: int, folder: Path) -> None:

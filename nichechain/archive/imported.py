@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from nichechain import births
 from nichechain.archive import read, write
 from nichechain.births.joins import repeated
-from nichechain.births.table import NONE, Offspring
+from nichechain.births.table import NONE
 from nichechain.core.errors import ArchiveError, NichechainError
 from nichechain.core.files import writing
 from nichechain.niches import Niches
@@ -47,6 +47,9 @@ class Columns:
         Number of the parent within its run, which tells siblings from cousins.
     step : str, optional
         Step of the search.
+    lineage : str, optional
+        True or 1 where the parent was not selected but is the latest birth of a lineage; by default
+        nowhere.
     """
 
     parent: str | tuple[str, ...] = "parent_niche"
@@ -55,6 +58,7 @@ class Columns:
     uid: str | None = None
     elite: str | None = None
     step: str | None = None
+    lineage: str | None = None
 
     @property
     def names(self) -> list[str]:
@@ -62,7 +66,8 @@ class Columns:
         of_states = [
             [given] if isinstance(given, str) else list(given) for given in (self.parent, self.child)
         ]
-        others = [name for name in (self.run, self.uid, self.elite, self.step) if name is not None]
+        given = (self.run, self.uid, self.elite, self.step, self.lineage)
+        others = [name for name in given if name is not None]
         return list(dict.fromkeys([*of_states[0], *of_states[1], *others]))
 
 
@@ -214,7 +219,7 @@ def _nothing_to_go_on_with(number: int, dimensions: int) -> SearchState:
     whole, real = np.empty(0, np.int64), np.empty(0)
     none = np.empty((0, 0), np.float32)
     elites = Elites(whole, none, np.empty((0, dimensions)), real, real, whole, whole)
-    return SearchState(elites, Offspring.none(0), number, 0)
+    return SearchState.at_rest(elites, number, 0)
 
 
 @dataclass(frozen=True)
@@ -241,6 +246,12 @@ class _Reader:
                 f"row {_row(lost)} has a parent's niche but no {columns.elite}: "
                 "leave the column out, or fill it"
             )
+        lineage = self._yes(columns.lineage) if columns.lineage else np.zeros(size, bool)
+        orphan = lineage & (parent == NONE)
+        if orphan.any():
+            raise NichechainError(
+                f"row {_row(orphan)} has {columns.lineage} but no parent, which every birth of a lineage has"
+            )
         gone = child == NONE
         nothing = pa.nulls(size)
         failed = np.where(gone, _UNKNOWN, "")
@@ -260,6 +271,7 @@ class _Reader:
             nothing,
             pa.array(failed, pa.string(), mask=~gone),
             pa.array(step, mask=step == NONE),
+            lineage,
         ]
         schema = births.schema(dimensions)
         try:
@@ -331,6 +343,20 @@ class _Reader:
         if none.any() and not nulls:
             raise NichechainError(f"row {_row(none)} has no {name}, but every birth must have one")
         return whole
+
+    def _yes(self, name: str) -> NDArray[np.bool_]:
+        column = self.table[name]
+        if pa.types.is_boolean(column.type):
+            said: NDArray[np.bool_] = column.fill_null(False).to_numpy().astype(bool)
+            return said
+        number = self._whole(name, lowest=0, nulls=True)
+        odd = number > 1
+        if odd.any():
+            raise NichechainError(
+                f"row {_row(odd)} has {name} {number[odd][0]}, but must have true or false, or 1 or 0"
+            )
+        one: NDArray[np.bool_] = number == 1
+        return one
 
     def _runs(self, name: str | None) -> Ints:
         if name is None:

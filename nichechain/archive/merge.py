@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +11,6 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from nichechain.archive import read, write
-from nichechain.births.table import Offspring
 from nichechain.core.errors import ArchiveError, NichechainError
 from nichechain.core.files import writing
 from nichechain.niches import Niches
@@ -43,14 +42,14 @@ def merge(folders: Sequence[str | Path], out: str | Path) -> None:
 
     Births are put one after the other, runs and births numbered on, so that counts add. The elite of
     a niche is the birth with the largest key, as if one search had met them all; the birth
-    of the earlier run stays where keys are equal. What was pending is dropped: no build goes on
-    with the result.
+    of the earlier run stays where keys are equal. What was pending and lineages under way are
+    dropped: no build goes on with the result.
 
     Parameters
     ----------
     folders : sequence of paths
         At least two archives of the same domain, niches, mutation and replacement. They may be
-        merged themselves.
+        merged themselves, or calibrated.
     out : path
         Where the result goes; it must not hold an archive.
 
@@ -64,7 +63,8 @@ def merge(folders: Sequence[str | Path], out: str | Path) -> None:
     Notes
     -----
     ``meta.origin["runs"]`` has, for every run of the result, its configuration, its number of
-    births and the uid of its first: the uid that a birth had in its own run is what lies above.
+    births and the uid of its first: the uid that a birth had in its own run is what lies above. Of a
+    run that was calibrated it tells which births that added, by their uids in the run.
     """
     paths, out = [Path(folder) for folder in folders], Path(out)
     if len(paths) < 2:
@@ -85,9 +85,8 @@ def merge(folders: Sequence[str | Path], out: str | Path) -> None:
         first_uid += meta.births
     births = pa.concat_tables(tables)
     config = replace(metas[0].config, evaluations=len(births))
-    pending = Offspring.none(elites[0].genotype.shape[1])
     step = max(meta.step for meta in metas)
-    state = SearchState(Elites.concatenate(elites).winners(), pending, len(births), step)
+    state = SearchState.at_rest(Elites.concatenate(elites).winners(), len(births), step)
     with writing(out):
         if read.is_archive(out):
             raise ArchiveError(f"{out} already holds an archive: merge into another folder")
@@ -117,6 +116,8 @@ def _runs(paths: list[Path], metas: list[read.Meta]) -> list[dict[str, Any]]:
             own: list[dict[str, Any]] = [
                 {"config": meta.config.to_json(), "births": meta.births, "first_uid": 0}
             ]
+            if meta.calibrations:
+                own[0]["calibrations"] = [asdict(each) for each in meta.calibrations]
         else:
             own = meta.origin["runs"]
         for run in own:

@@ -12,6 +12,7 @@ import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, fields, replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -21,13 +22,14 @@ import pyarrow.compute as pc
 
 from nichechain import births
 from nichechain.archive import untrusted
-from nichechain.births.table import Offspring
+from nichechain.births.table import LINEAGE, Offspring
 from nichechain.core.errors import ArchiveError
 from nichechain.core.text import printable_values
 from nichechain.domains.base import Domain
 from nichechain.niches import Niches
 from nichechain.search.config import BuildConfig
 from nichechain.search.elites import Elites, SearchState
+from nichechain.search.lineages import Calibration, UnderWay
 from nichechain.search.making import make_niches
 
 FORMAT = 1
@@ -58,6 +60,15 @@ _ARRAYS: dict[str, tuple[Any, int]] = {
     "pending_parent_uid": _INTS,
     "pending_parent_niche": _INTS,
     "pending_depth": _INTS,
+}
+# Files without any lineage lack these.
+_LINEAGE_ARRAYS: dict[str, tuple[Any, int]] = {
+    "pending_lineage": (np.bool_, 1),
+    "lineage_slot": _INTS,
+    "lineage_genotype": _GENOTYPES,
+    "lineage_uid": _INTS,
+    "lineage_niche": _INTS,
+    "lineage_depth": _INTS,
 }
 
 
@@ -117,6 +128,8 @@ class Meta:
     machine : dict
         What kind of machine made it, see :func:`nichechain.core.machine.machine`; empty in archives
         of before it was recorded.
+    calibrations : tuple of Calibration
+        Births of lineages that were added after the build, in order; only the last may be unfinished.
     """
 
     config: BuildConfig
@@ -129,6 +142,12 @@ class Meta:
     origin: dict[str, Any] | None = None
     centroids: dict[str, Any] | None = None
     machine: dict[str, str] = field(default_factory=dict)
+    calibrations: tuple[Calibration, ...] = ()
+
+    @property
+    def built(self) -> int:
+        """Births of the build, without those that a calibration added."""
+        return self.calibrations[0].first_uid if self.calibrations else self.births
 
     @property
     def imported(self) -> bool:
@@ -138,7 +157,7 @@ class Meta:
     @property
     def complete(self) -> bool:
         """Whether the build reached its budget."""
-        return self.births >= self.config.evaluations
+        return self.built >= self.config.evaluations
 
 
 def is_archive(folder: Path) -> bool:
@@ -198,6 +217,9 @@ def _meta(values: dict[str, Any]) -> Meta:
     origin = values.get("origin")
     if origin is not None and origin["kind"] not in ("merged", "imported"):
         raise ValueError(f"it is {origin['kind']!r}, which this version cannot read")
+    if origin is not None and origin["kind"] == "merged":
+        for run in origin["runs"]:
+            calibrations_of(run, int(run["births"]))
     facts = values["domain"]
     start = facts["start"]
     names = tuple(str(name) for name in facts["behavior_names"])
@@ -219,7 +241,37 @@ def _meta(values: dict[str, Any]) -> Meta:
         origin,
         centroids,
         {str(name): str(value) for name, value in values.get("machine", {}).items()},
+        calibrations_of(values, total),
     )
+
+
+def calibrations_of(values: dict[str, Any], births: int) -> tuple[Calibration, ...]:
+    """The calibrations that metadata tell of, of an archive or of one of its runs.
+
+    Parameters
+    ----------
+    values : dict
+    births : int
+        Births of the archive or run.
+
+    Raises
+    ------
+    ValueError
+        If they do not follow one another up to the last birth.
+    """
+    found = tuple(
+        Calibration(int(each["first_step"]), int(each["first_uid"]), int(each["births"]))
+        for each in values.get("calibrations", ())
+    )
+    for each, later in pairwise(found):
+        if later.first_uid != each.end or later.first_step <= each.first_step:
+            raise ValueError("its calibrations do not follow one another")
+    for each in found:
+        if not (0 < each.first_uid <= births and each.births > 0 and each.first_step > 0):
+            raise ValueError(f"it has a calibration of {each.births} births from birth {each.first_uid} on")
+    if found and births > found[-1].end:
+        raise ValueError(f"its calibrations do not add up to {births} births")
+    return found
 
 
 def _entry(values: dict[str, Any]) -> dict[str, Any]:
@@ -272,21 +324,29 @@ def read_state(folder: Path, meta: Meta) -> SearchState:
     """
     content = _read(folder, meta.elites)
     with _reading(folder / meta.elites["file"]):
-        arrays = untrusted.read_arrays(content, _ARRAYS)
+        arrays = untrusted.read_arrays(content, _ARRAYS, _LINEAGE_ARRAYS)
         elites = Elites(*(arrays[field.name] for field in fields(Elites)))
+        arrays.setdefault("pending_lineage", np.zeros(len(arrays["pending_uid"]), bool))
         pending = Offspring(*(arrays[f"pending_{field.name}"] for field in fields(Offspring)))
-        _check_state(elites, pending, meta)
-    return SearchState(elites, pending, meta.births, meta.step)
+        lineages = UnderWay.none(elites.genotype.shape[1])
+        if "lineage_slot" in arrays:
+            lineages = UnderWay(*(arrays[f"lineage_{field.name}"] for field in fields(UnderWay)))
+        _check_state(elites, pending, lineages, meta)
+    return SearchState(elites, pending, meta.births, meta.step, lineages)
 
 
-def _check_state(elites: Elites, pending: Offspring, meta: Meta) -> None:
-    for rows in (elites, pending):
+def _check_state(elites: Elites, pending: Offspring, lineages: UnderWay, meta: Meta) -> None:
+    for rows in (elites, pending, lineages):
         if len({len(column) for column in rows.columns().values()}) != 1:
             raise ValueError("its arrays differ in length")
     if elites.behavior.shape[1] != len(meta.config.bounds):
         raise ValueError(f"its behaviors have {elites.behavior.shape[1]} axes")
     if len(pending) and pending.genotype.shape[1] != elites.genotype.shape[1]:
         raise ValueError("its genotypes differ in length")
+    if len(lineages) and lineages.genotype.shape[1] != elites.genotype.shape[1]:
+        raise ValueError("its genotypes differ in length")
+    if (np.diff(lineages.slot, prepend=-1) <= 0).any():
+        raise ValueError("its lineages are in no order")
     if (np.diff(elites.niche, prepend=-1) <= 0).any() or (elites.niche > _outside(meta)).any():
         raise ValueError("its elites are in no order, or in niches that do not exist")
 
@@ -358,7 +418,8 @@ def read_part(folder: Path, meta: Meta, part: dict[str, Any], columns: list[str]
     # Twice the strings, for numbers and structure take less than those.
     content = _read(folder, part, _SMALLEST_LIMIT + 2 * untrusted.LONGEST_STRING * rows)
     with _reading(folder / part["file"]):
-        table = untrusted.read_table(content, births.schema(len(meta.config.bounds)), rows, columns)
+        schema = births.schema(len(meta.config.bounds))
+        table = untrusted.read_table(content, schema, rows, columns, flag=LINEAGE)
         for name in ("parent_niche", "child_niche"):
             if name in table.column_names:
                 bounds = pc.min_max(table[name]).as_py()

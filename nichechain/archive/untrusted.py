@@ -80,7 +80,11 @@ def read_object(content: bytes) -> dict[str, Any]:
     return values
 
 
-def read_arrays(content: bytes, kinds: Mapping[str, tuple[DTypeLike, int]]) -> dict[str, NDArray[Any]]:
+def read_arrays(
+    content: bytes,
+    kinds: Mapping[str, tuple[DTypeLike, int]],
+    optional: Mapping[str, tuple[DTypeLike, int]],
+) -> dict[str, NDArray[Any]]:
     """Arrays of an ``.npz`` file as ``numpy.savez`` writes it: uncompressed, never pickled.
 
     Parameters
@@ -88,6 +92,8 @@ def read_arrays(content: bytes, kinds: Mapping[str, tuple[DTypeLike, int]]) -> d
     content : bytes
     kinds : mapping of str to (dtype, int)
         Type and number of dimensions of each array that is wanted.
+    optional : mapping of str to (dtype, int)
+        The same of arrays that are wanted where they are there: all of them, or none is.
     """
     with zipfile.ZipFile(io.BytesIO(content)) as archive:
         members = archive.infolist()
@@ -96,6 +102,7 @@ def read_arrays(content: bytes, kinds: Mapping[str, tuple[DTypeLike, int]]) -> d
         if sum(member.file_size for member in members) > len(content):
             raise ValueError("it claims to hold more than it does")
         names = [member.filename for member in members]
+        kinds = {**kinds, **(optional if any(f"{name}.npy" in names for name in optional) else {})}
         for name in kinds:
             if names.count(f"{name}.npy") != 1:
                 raise ValueError(f"it should hold {name} once")
@@ -126,7 +133,9 @@ def read_array(content: bytes, dtype: DTypeLike, dimensions: int) -> NDArray[Any
     return flat.reshape(shape, order="F" if fortran else "C").copy(order="K")
 
 
-def read_table(content: bytes, schema: pa.Schema, rows: int, columns: list[str] | None = None) -> pa.Table:
+def read_table(
+    content: bytes, schema: pa.Schema, rows: int, columns: list[str] | None = None, *, flag: str
+) -> pa.Table:
     """A Parquet file of that schema and that many rows.
 
     Parameters
@@ -138,7 +147,10 @@ def read_table(content: bytes, schema: pa.Schema, rows: int, columns: list[str] 
         Memory is bounded by a multiple of it.
     columns : list of str, optional
         Those that are wanted; by default all.
+    flag : str
+        The last column, which may be missing where it is false in all rows.
     """
+    flagged = schema
     texts = [field.name for field in schema if pa.types.is_string(field.type)]
     file = pq.ParquetFile(
         pa.BufferReader(content),
@@ -149,6 +161,8 @@ def read_table(content: bytes, schema: pa.Schema, rows: int, columns: list[str] 
         thrift_container_size_limit=_THRIFT,
     )
     meta = file.metadata
+    if flag not in meta.schema.to_arrow_schema().names:
+        schema = schema.remove(schema.get_field_index(flag))
     if not meta.schema.to_arrow_schema().remove_metadata().equals(schema):
         raise ValueError("its columns are not those of births")
     groups = [meta.row_group(group) for group in range(meta.num_row_groups)]
@@ -159,7 +173,7 @@ def read_table(content: bytes, schema: pa.Schema, rows: int, columns: list[str] 
         size = sum(decoded_size(content, group.column(index)) for group in groups)
         if size > _SLACK + (LONGEST_STRING if name in texts else _NUMBER) * rows:
             raise ValueError(f"its column {name} claims to be larger than it can be")
-    table = file.read(columns)
+    table = file.read(columns if columns is None else [name for name in columns if name in schema.names])
     if len(table) != rows:
         raise ValueError(f"it has {len(table)} rows, but {rows} were written")
     for name in texts:
@@ -167,7 +181,9 @@ def read_table(content: bytes, schema: pa.Schema, rows: int, columns: list[str] 
             place = table.column_names.index(name)
             table = table.set_column(place, schema.field(name), _spelled_out(table[name]))
     table.validate(full=True)
-    return table
+    if flag not in table.column_names and (columns is None or flag in columns):
+        table = table.append_column(flagged.field(flag), pa.array(np.zeros(rows, bool)))
+    return table if columns is None else table.select(columns)
 
 
 def _spelled_out(texts: pa.ChunkedArray) -> pa.ChunkedArray:

@@ -7,13 +7,13 @@ meta.json
     checksum. It is replaced atomically, and that is the commit: files it does not name do not
     count. It holds nothing that differs between two builds of one configuration.
 elites-<births>.npz
-    Elites and pending children, plain arrays.
+    Elites, pending children and lineages under way, plain arrays.
 centroids.npy
     Of a tessellation only: its centroids, a plain array, written once. Reading an archive never
     makes them again, so that no version of a library can move its niches.
 births/part-<number>-<rows>.parquet
     Births, ``PART_ROWS`` to a part. Full parts are final; the last is rewritten under a new name
-    until it is full.
+    until it is full. A part without a birth of a lineage lacks the column ``lineage``.
 
 Nothing is pickled, so an untrusted archive cannot run code.
 """
@@ -22,7 +22,7 @@ from __future__ import annotations
 
 import io
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import asdict
 from pathlib import Path
@@ -30,6 +30,7 @@ from typing import Any
 
 import numpy as np
 import pyarrow as pa
+import pyarrow.compute as pc
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
@@ -47,6 +48,7 @@ from nichechain.archive.read import (
     read_meta,
     read_part,
 )
+from nichechain.births.table import LINEAGE
 from nichechain.core.errors import ArchiveError
 from nichechain.core.files import write_atomically
 from nichechain.core.machine import library_versions, machine
@@ -54,6 +56,7 @@ from nichechain.niches import CVTNiches, Niches
 from nichechain.search import savings
 from nichechain.search.config import BuildConfig
 from nichechain.search.elites import SearchState
+from nichechain.search.lineages import Calibration
 
 PART_ROWS = 65_536
 
@@ -71,6 +74,8 @@ class Writer:
         As in :class:`Meta`, for births that no build made.
     niches : Niches, optional
         Those of the configuration; needed where they are a tessellation that no commit has kept.
+    calibrations : sequence of Calibration
+        Which births were added to those of the build.
     """
 
     def __init__(
@@ -81,11 +86,13 @@ class Writer:
         origin: dict[str, Any] | None = None,
         *,
         niches: Niches | None = None,
+        calibrations: Sequence[Calibration] = (),
     ) -> None:
         self._folder = folder
         self._config = config
         self._facts = facts
         self._origin = origin
+        self._calibrations = calibrations
         self._tessellation = niches if isinstance(niches, CVTNiches) else None
         self._centroids: dict[str, Any] | None = None
         self._committed = 0
@@ -169,6 +176,10 @@ class Writer:
         parts = [*self._full, self._write_part(self._tail)] if len(self._tail) else self._full
         arrays = state.elites.columns()
         arrays |= {f"pending_{name}": column for name, column in state.pending.columns().items()}
+        arrays |= {f"lineage_{name}": column for name, column in state.lineages.columns().items()}
+        if not (state.pending.lineage.any() or len(state.lineages)):
+            # As archives were before there were lineages.
+            arrays = {name: array for name, array in arrays.items() if LINEAGE not in name}
         buffer = io.BytesIO()
         np.savez(buffer, allow_pickle=False, **arrays)
         elites = self._write(f"elites-{state.births:09d}.npz", buffer.getvalue())
@@ -185,6 +196,8 @@ class Writer:
         }
         if self._origin is not None:
             meta["origin"] = self._origin
+        if self._calibrations:
+            meta["calibrations"] = [asdict(each) for each in self._calibrations]
         if self._centroids is None and self._tessellation is not None:
             self._centroids = self._write(CENTROIDS, _as_npy(self._tessellation.centroids))
         if self._centroids is not None:
@@ -196,6 +209,8 @@ class Writer:
 
     def _write_part(self, rows: pa.Table) -> dict[str, Any]:
         buffer = pa.BufferOutputStream()
+        if not pc.any(rows[LINEAGE]).as_py():
+            rows = rows.drop_columns([LINEAGE])
         pq.write_table(rows.combine_chunks(), buffer, compression="zstd")
         name = part_name(len(self._full), len(rows))
         return {**self._write(name, buffer.getvalue().to_pybytes()), "rows": len(rows)}

@@ -19,6 +19,10 @@ failed : string
     Why its evaluation failed, null where it did not.
 step : int32
     Step of the search, 0 for the initial births.
+lineage : bool
+    Whether the parent is the latest birth of an unselected lineage, see
+    :mod:`nichechain.search.lineages`; false where a parent was selected, or is nobody. Parts of an
+    archive that have no such birth lack the column.
 """
 
 from __future__ import annotations
@@ -37,6 +41,9 @@ from nichechain.domains.base import Evaluation
 if TYPE_CHECKING:
     import pandas as pd
 
+LINEAGE = "lineage"
+"""The column that parts may lack."""
+
 NONE = -1
 """Stands for a null uid or niche in the arrays of this package."""
 
@@ -52,6 +59,8 @@ class Offspring(Columnar):
     parent_uid, parent_niche : (N,) int64 arrays
         ``NONE`` for initial births.
     depth : (N,) int64 array
+    lineage : (N,) bool array
+        Whose parent is the latest birth of a lineage.
     """
 
     genotype: NDArray[np.float32]
@@ -59,12 +68,13 @@ class Offspring(Columnar):
     parent_uid: NDArray[np.int64]
     parent_niche: NDArray[np.int64]
     depth: NDArray[np.int64]
+    lineage: NDArray[np.bool_]
 
     @classmethod
     def none(cls, length: int) -> Offspring:
         """No offspring, of genotypes of that length."""
         none = np.empty(0, np.int64)
-        return cls(np.empty((0, length), np.float32), none, none, none, none)
+        return cls(np.empty((0, length), np.float32), none, none, none, none, np.empty(0, bool))
 
 
 def schema(axes: int) -> pa.Schema:
@@ -82,6 +92,7 @@ def schema(axes: int) -> pa.Schema:
             ("accepted", pa.bool_()),
             ("failed", pa.string()),
             ("step", pa.int32()),
+            (LINEAGE, pa.bool_()),
         ]
     )
 
@@ -136,6 +147,7 @@ def make_table(
         accepted,
         pa.array(evaluation.reasons, pa.string(), mask=~failed),
         np.full(n, step, np.int32),
+        offspring.lineage,
     ]
     target = schema(axes)
     arrays = [pa.array(column).cast(field.type) for column, field in zip(columns, target, strict=True)]

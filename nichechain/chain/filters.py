@@ -1,4 +1,4 @@
-"""Counts of some of the births only: of one run, of a window of steps, of those that were accepted."""
+"""Counts of some of the births only: of one run, a window of steps, those accepted, those of lineages."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from nichechain.births.table import check_columns
+from nichechain.births.table import LINEAGE, check_columns
 from nichechain.chain.counts import TransitionCounts
 from nichechain.core.errors import NichechainError
 from nichechain.niches import Niches
@@ -19,6 +19,7 @@ def counts_of(
     run: int | None = None,
     steps: tuple[int, int] | None = None,
     accepted: bool = False,
+    lineages: bool | None = None,
 ) -> TransitionCounts:
     """Counts of births.
 
@@ -35,6 +36,8 @@ def counts_of(
     accepted : bool
         Only births that became the elite of their niche. Their T is that of the children that a
         search kept, not of all that parents have.
+    lineages : bool, optional
+        Only births whose parent is the latest of an unselected lineage, or only all others.
 
     Returns
     -------
@@ -59,6 +62,10 @@ def counts_of(
         births = births.filter(pc.and_(pc.greater_equal(step, first), pc.less(step, end)))
     if accepted:
         births = births.filter(_said(births, "accepted", "whether they were accepted"))
+    if lineages is not None:
+        check_columns(births, LINEAGE)
+        flag = births[LINEAGE].fill_null(False)
+        births = births.filter(flag if lineages else pc.invert(flag))
     return TransitionCounts.from_births(births, niches)
 
 

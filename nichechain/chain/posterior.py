@@ -12,6 +12,7 @@ from scipy import sparse
 
 from nichechain.chain.base_measure import BaseMeasure
 from nichechain.chain.counts import TransitionCounts
+from nichechain.chain.elites import elite_concentration
 from nichechain.chain.operator import PooledTransition
 from nichechain.chain.prior import FittedPrior
 
@@ -59,6 +60,15 @@ class DirichletPosterior:
         """C_ij / e_i: births of each row as independent ones, (S, S)."""
         return (sparse.diags_array(1.0 / self.design_effect) @ self.counts.matrix).tocsr()
 
+    @cached_property
+    def elite_concentration(self) -> float:
+        """How many children of an elite its niche's row is worth to what is known of that elite.
+
+        See :func:`nichechain.chain.elites.elite_concentration`; s where births cannot say.
+        """
+        fitted = elite_concentration(self.counts, self.base.probability, self.strength, self.design_effect)
+        return self.strength if fitted is None else fitted
+
     @property
     def absorbing(self) -> bool:
         """Whether the outside state is never left, by decree."""
@@ -100,8 +110,7 @@ class DirichletPosterior:
         Dirichlet(s B), though not the higher moments, and T is a :class:`PooledTransition`.
         """
         if self.prior is not None:
-            base, strength = self.prior.draw(rng)
-            return replace(self, base=base, strength=strength, prior=None).draw(rng)
+            return self.settled(rng).draw(rng)
         matrix = self.weights.tocoo()
         rows, columns = matrix.coords
         births = self.counts.births / self.design_effect
@@ -129,9 +138,12 @@ class DirichletPosterior:
         index = np.concatenate([rows, parents]), np.concatenate([columns, landed])
         return _collected(*self._absorbed(data, index), states)
 
-    def settled(self, rng: np.random.Generator) -> DirichletPosterior:  # noqa: ARG002
+    def settled(self, rng: np.random.Generator) -> DirichletPosterior:
         """The same under one draw of base and strength, where these are not known either."""
-        return self
+        if self.prior is None:
+            return self
+        base, strength = self.prior.draw(rng)
+        return replace(self, base=base, strength=strength, prior=None)
 
     def _draw_atoms(
         self, known: Floats, observed: tuple[Ints, Ints, Floats], rng: np.random.Generator

@@ -13,6 +13,7 @@ __all__ = ["COMMANDS", "main"]
 COMMANDS = {
     "domains": "what can be searched, with bounds and genotype lengths",
     "build": "fill an archive: MAP-Elites that records who was born where",
+    "calibrate": "births of unselected lineages, added to an archive that is there",
     "info": "what is in an archive, and what made it",
     "evolvability": "l-evolvability of niches, or of an elite",
     "landscape": "sensitivity, evolvability and dissimila of the elites of an archive",

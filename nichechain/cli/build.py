@@ -225,6 +225,7 @@ def run(arguments: Sequence[str]) -> int:
 def _report(folder: Path, shown: object) -> None:
     """A short account of a finished build, and what to do next."""
     import numpy as np
+    import pandas as pd
     from rich.console import Console
 
     from nichechain.archive.archive import load
@@ -242,8 +243,10 @@ def _report(folder: Path, shown: object) -> None:
     most = np.argsort(-births_of, kind="stable")[: _SCORED if n > _MANY_NICHES else n]
     roots = np.sort(most[births_of[most] >= _RANKED])
     question = Question(draws=DRAWS if n <= _MANY_NICHES else _FEW_DRAWS)
-    scores = answer_for_niches(chain, question, roots=roots)
-    ranking = scores.ranking(chain, min_births=_RANKED).dropna().head(5)
+    ranking = pd.DataFrame()
+    if roots.size:
+        scores = answer_for_niches(chain, question, roots=roots)
+        ranking = scores.ranking(chain, min_births=_RANKED).dropna().head(5)
     failed = archive.meta.births - int(counts.visits.sum())
     births = archive.meta.births
     rows = {

@@ -44,6 +44,8 @@ class ImportCommand:
     """Column with the parent's number: lets children of one parent count as related."""
     step: Annotated[str | None, parsing.option("COLUMN", "none")] = None
     """Column with the step of the search."""
+    lineage: Annotated[str | None, parsing.option("COLUMN", "none")] = None
+    """Column that is true where the parent was not selected: it was the latest birth of a lineage."""
     names: Annotated[str | None, parsing.option("NAME,NAME", "the behavior columns")] = None
     """What the axes of behavior are called."""
     unit: str = "units"
@@ -67,6 +69,7 @@ def run(arguments: Sequence[str]) -> int:
         command.uid,
         command.elite,
         command.step,
+        command.lineage,
     )
     niches = GridNiches(
         parse_shape(command.grid, "--grid"), parse_bounds(command.bounds, "--bounds"), command.outside

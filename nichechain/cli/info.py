@@ -22,12 +22,18 @@ class InfoCommand:
 def run(arguments: Sequence[str]) -> int:
     """Say what is in the archive."""
     command = parsing.parse(InfoCommand, arguments)
+    import pyarrow.compute as pc
+
+    from nichechain.archive import read
     from nichechain.archive.archive import load
+    from nichechain.births.table import LINEAGE
     from nichechain.search import savings
 
     archive = load(command.path)
     saved = savings.read(archive.folder)
     meta, counts, config = archive.meta, archive.counts, archive.config
+    flags = read.read_births(archive.folder, meta, [LINEAGE])[LINEAGE]
+    of_lineages = int(pc.sum(flags).as_py() or 0)
     size = sum(path.stat().st_size for path in archive.folder.rglob("*") if path.is_file())
     names, unit = meta.facts.behavior_names, meta.facts.unit
     content: dict[str, Any] = {
@@ -40,6 +46,8 @@ def run(arguments: Sequence[str]) -> int:
         "niches_filled_never_parent": counts.never_parent,
         "rows_of_T_observed": counts.rows_observed,
         "births_outside": counts.births_outside,
+        "births_of_lineages": of_lineages,
+        "births_of_calibrations": meta.births - meta.built,
         "births_failed": meta.births - int(counts.visits.sum()),
         "deepest_elite": int(archive.elites.depth.max()) if len(archive.elites) else 0,
         "genotype_length": int(archive.elites.genotype.shape[1]),
@@ -58,6 +66,10 @@ def run(arguments: Sequence[str]) -> int:
         f"{name} {low:g} to {high:g} {unit}" for name, (low, high) in zip(names, config.bounds, strict=True)
     )
     state = "complete" if meta.complete else f"unfinished, {config.evaluations} asked for"
+    if meta.calibrations:
+        state += f", {content['births_of_calibrations']} of them added by calibrate"
+        left = meta.calibrations[-1].end - meta.births
+        state += f", {left} more to come" if left else ""
     if meta.origin is not None:
         state = meta.origin["kind"]
     rows = {
@@ -65,6 +77,7 @@ def run(arguments: Sequence[str]) -> int:
         "births": f"{meta.births} ({state})",
         "  out of bounds": str(content["births_outside"]),
         "  failed": str(content["births_failed"]),
+        "  of unselected lineages": str(of_lineages),
         "grid" if config.niches == "grid" else "tessellation": f"{cells} over {spans}",
         "niches filled": f"{content['niches_filled']} of {len(archive.niches)}",
         "  never filled": str(content["niches_never_filled"]),

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.progress import Progress, TaskID
 
-    from nichechain.archive.building import BuildProgress
+    from nichechain.archive.filling import BuildProgress
 
 # Seconds between progress lines where there is no terminal to redraw.
 _LINE_EVERY = 10.0

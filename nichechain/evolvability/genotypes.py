@@ -60,8 +60,9 @@ def genotype_evolvability(
         niches that none of m offspring happened to hit; at l = 1 and U ≤ m, rarefaction of the
         observed counts instead. ``empirical``: D is the observed share, the paper's letter.
     strength : float, optional
-        s, how many offspring the row of T is worth in D; by default what the base measure is
-        worth to the rows of the chain, or 1 where T has no posterior.
+        s, how many offspring the row of T is worth in D; by default as many as make children of one
+        elite foretell each other best, see :func:`nichechain.chain.elites.elite_concentration`, or
+        1 where T has no posterior.
     chain : NicheChain, optional
         By default ``archive.chain()``.
     executor : Executor, optional
@@ -127,7 +128,7 @@ def draw_children(
 ) -> NDArray[np.float64]:
     """D of genotypes, (..., S), drawn given the states of their offspring and their niche's row of T."""
     if strength is None:
-        strength = 1.0 if chain.posterior is None else chain.posterior.strength
+        strength = 1.0 if chain.posterior is None else chain.posterior.elite_concentration
     weight: NDArray[np.float64] = rng.standard_gamma(counts + strength * row)
     weight /= weight.sum(axis=-1, keepdims=True)
     return weight

@@ -73,6 +73,9 @@ def l_evolvability(
 
     Notes
     -----
+    The interval tells what births leave open of T. It is not that of one elite of the niche, which has
+    a distribution of its own: see :func:`nichechain.evolvability.genotype_evolvability`.
+
     Source: the paper's section "Towards better evolvability definitions".
     """
     question = Question(l, lineages, convention, method, repeats, draws, seed)
@@ -138,7 +141,7 @@ def answer_for_niches(
     """
     n, steps, lineages = chain.n_niches, question.steps, question.lineages
     asked = np.arange(n) if roots is None else roots
-    if question.by_urns(chain) and asked.size:
+    if question.by_urns(chain):
         return _by_urns(chain, question, asked, tell)
     size = question.repeats_of_each(chain)
     standing = sparse.eye_array(chain.states, format="csr")
@@ -148,7 +151,7 @@ def answer_for_niches(
         if question.method != "monte-carlo":
             covered = expected_coverage(matrix, first, steps, [lineages, ENDLESS], counted=n)
             share = covered[:, 0] / np.maximum(covered[:, 1], 1e-300)
-            saturated |= bool(asked.size and np.median(share) > SATURATED)
+            saturated |= bool(np.median(share) > SATURATED)
             means.append(covered[:, 0])
             errors.append(np.zeros(asked.size))
         else:
@@ -201,7 +204,7 @@ def _by_urns(
     found = simulated_coverage(chain.posterior, question, [question.lineages], roots=asked, tell=tell)
     figures = found.summary()
     # Where nothing is impossible, lineages without end visit every niche.
-    saturated = bool(asked.size and np.median(figures[0]) > SATURATED * chain.n_niches)
+    saturated = bool(np.median(figures[0]) > SATURATED * chain.n_niches)
     return _of_all(chain, question, asked, figures, URNS, saturated)
 
 

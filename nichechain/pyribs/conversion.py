@@ -78,8 +78,7 @@ def from_ribs(
         "archive": type(archive).__name__,
         "emitters": emitters,
     }
-    pending = Offspring.none(elites.genotype.shape[1])
-    state = SearchState(elites, pending, len(rows), step)
+    state = SearchState.at_rest(elites, len(rows), step)
     write_archive(folder, niches, rows, origin, axes or Axes(), state=state, objective_name=objective_name)
     return load(folder)
 
@@ -136,7 +135,12 @@ def _as_births(archive: Any, cells: Any) -> pa.Table:
     size = cells.size
     none = np.full(size, NONE, np.int64)
     offspring = Offspring(
-        np.empty((size, 0), np.float32), np.arange(size), none, none, np.zeros(size, np.int64)
+        np.empty((size, 0), np.float32),
+        np.arange(size),
+        none,
+        none,
+        np.zeros(size, np.int64),
+        np.zeros(size, bool),
     )
     evaluation = Evaluation(
         data["measures"].astype(np.float64),

@@ -311,7 +311,9 @@ class Recording:
             own = np.array([emitter == number for emitter, _ in origins]) & fine
             if own.any():
                 strategy.born(solution[own].reshape(np.count_nonzero(own), -1), uid[own], self._step)
-        offspring = Offspring(np.empty((len(fine), 0), np.float32), uid, parents, parent_niche, depth)
+        offspring = Offspring(
+            np.empty((len(fine), 0), np.float32), uid, parents, parent_niche, depth, np.zeros(len(fine), bool)
+        )
         evaluation = Evaluation(
             np.where(fine[:, None], measures, np.nan).astype(np.float64),
             np.where(fine, objective, np.nan).astype(np.float64),

@@ -62,6 +62,11 @@ class SearchConfig:
         has a layer scale, or else one for all weights. They begin at the scale.
     selection : {"uniform", "curiosity"}
         How parents are drawn from the elites: each alike, or by curiosity, whose children enter.
+    lineage_share : float
+        Share of the births that unselected lineages get, whose parents are their own latest births:
+        they show what lineages do. With 0 all parents are selected.
+    lineage_length : int
+        Births of such a lineage, at least 2: the first is the child of an elite.
     replacement : {"random", "first", "newest", "objective"}
         Which birth of a niche is its elite: each alike, the first, the last, or the best.
     outside : {"state", "absorb", "clip"}
@@ -86,6 +91,8 @@ class SearchConfig:
     layer_scales: tuple[float, ...] = ()
     self_adaptive: bool = False
     selection: Selection = "uniform"
+    lineage_share: float = 0.05
+    lineage_length: int = 10
     replacement: Replacement = "random"
     outside: Outside = "state"
     seed: int = 0
@@ -126,7 +133,8 @@ class BuildConfig(SearchConfig):
     domain_options: Mapping[str, DomainOption] = field(default_factory=dict, hash=False)
 
     def __post_init__(self) -> None:
-        for name in ("evaluations", "initial", "batch", "seed", "domain_seed", "niches_seed"):
+        whole = ("evaluations", "initial", "batch", "seed", "domain_seed", "niches_seed", "lineage_length")
+        for name in whole:
             try:
                 # Numbers of NumPy become plain ones, which JSON can hold.
                 object.__setattr__(self, name, operator.index(getattr(self, name)))
@@ -155,6 +163,13 @@ class BuildConfig(SearchConfig):
             object.__setattr__(self, "step_bound", (kind, float(size)))
         check_at_least(1, evaluations=self.evaluations, initial=self.initial, batch=self.batch)
         check_at_least(0, seed=self.seed, domain_seed=self.domain_seed, niches_seed=self.niches_seed)
+        check_numbers(lineage_share=self.lineage_share)
+        object.__setattr__(self, "lineage_share", float(self.lineage_share))
+        if not 0 <= self.lineage_share < 1:
+            raise NichechainError(
+                f"lineage_share is {self.lineage_share:g}, but must be a share of births, from 0 to below 1"
+            )
+        check_at_least(2, lineage_length=self.lineage_length)
         check_choice("replacement", self.replacement, get_args(Replacement))
         check_choice("niches", self.niches, get_args(NichesKind))
         if self.niches == "cvt" and len(self.shape) != 1:
@@ -183,4 +198,5 @@ class BuildConfig(SearchConfig):
             raise NichechainError(
                 f"the configuration has missing or unknown values: {', '.join(sorted(odd))}"
             )
-        return cls(**values)
+        # Before there were lineages, builds had none.
+        return cls(**{"lineage_share": 0.0, **values})

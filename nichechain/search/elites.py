@@ -16,6 +16,7 @@ from nichechain.core.columns import Columnar
 from nichechain.domains.base import Domain
 from nichechain.niches import Niches
 from nichechain.niches.ribs import empty_archive
+from nichechain.search.lineages import UnderWay
 
 
 @dataclass(frozen=True)
@@ -61,12 +62,21 @@ class SearchState:
         Births so far.
     step : int
         The last step begun, 0 for the initial births; -1 before them.
+    lineages : UnderWay
+        Those under way.
     """
 
     elites: Elites
     pending: Offspring
     births: int
     step: int
+    lineages: UnderWay
+
+    @classmethod
+    def at_rest(cls, elites: Elites, births: int, step: int) -> SearchState:
+        """A state of a search that has nothing under way."""
+        length = elites.genotype.shape[1]
+        return cls(elites, Offspring.none(length), births, step, UnderWay.none(length))
 
 
 class EliteArchive:

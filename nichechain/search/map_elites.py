@@ -3,11 +3,13 @@
 One step: draw parents from the occupied niches, mutate, evaluate, keep. Elites live in
 a pyribs archive. Which birth of a niche is its elite follows one rule, *the largest key wins*,
 so the elites after N births are a function of the set of births, in whatever order they came.
+Some of the children come from unselected lineages instead, see :mod:`nichechain.search.lineages`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -22,6 +24,7 @@ from nichechain.execution import Executor
 from nichechain.niches import Niches
 from nichechain.search.config import BuildConfig
 from nichechain.search.elites import EliteArchive, Elites, SearchState
+from nichechain.search.lineages import Stretch, UnderWay
 from nichechain.search.parents import CuriosityScores, draw_curious
 from nichechain.search.savings import Savings
 from nichechain.variation import Mutation
@@ -40,6 +43,8 @@ class MapElites:
         Where to go on from; by default from the start.
     curiosity : CuriosityScores, optional
         Scores after the births so far, where parents are selected by them and there is a state.
+    stretch : Stretch, optional
+        The steps to come, by default those of the build.
 
     Attributes
     ----------
@@ -66,6 +71,7 @@ class MapElites:
         config: BuildConfig,
         state: SearchState | None = None,
         curiosity: CuriosityScores | None = None,
+        stretch: Stretch | None = None,
     ) -> None:
         if config.selection == "curiosity" and state is not None and curiosity is None:
             raise NichechainError("a search that selects by curiosity goes on from its scores: give them")
@@ -74,8 +80,10 @@ class MapElites:
         self._niches = niches
         self._config = config
         self._mutate = mutate
+        self._stretch = stretch or Stretch.of_build(config)
         self._archive = EliteArchive(domain, niches)
         self._pending = Offspring.none(domain.genotype_length)
+        self._lineages = UnderWay.none(domain.genotype_length)
         self.births = 0
         self.step = -1
         self.savings = Savings()
@@ -83,6 +91,7 @@ class MapElites:
         if state is not None:
             self._archive.add(state.elites)
             self._pending = state.pending
+            self._lineages = state.lineages
             self.births = state.births
             self.step = state.step
 
@@ -90,7 +99,7 @@ class MapElites:
     def state(self) -> SearchState:
         """The search after its last finished batch."""
         elites = self._archive.elites(self._archive.occupied())
-        return SearchState(elites, self._pending, self.births, self.step)
+        return SearchState(elites, self._pending, self.births, self.step, self._lineages)
 
     @property
     def filled(self) -> int:
@@ -142,7 +151,7 @@ class MapElites:
         n = self._config.initial
         genotypes = self._domain.sample(n, seed=keyed(self._config.seed, Purpose.INITIAL))
         none = np.full(n, NONE, np.int64)
-        return Offspring(genotypes, np.arange(n), none, none, np.zeros(n, np.int64))
+        return Offspring(genotypes, np.arange(n), none, none, np.zeros(n, np.int64), np.zeros(n, bool))
 
     def _children(self, step: int) -> Offspring:
         occupied = self._archive.occupied()
@@ -153,7 +162,7 @@ class MapElites:
                 f"none of the {self.births} initial births can be a parent: "
                 "widen the bounds, keep outside as a state, or raise the number of initial births"
             )
-        batch = self._config.batch
+        batch = self._stretch.batch
         rng = keyed(self._config.seed, Purpose.SELECTION, step)
         if self._config.selection == "curiosity":
             scores = self._curiosity.of(self._archive.elites(occupied).uid)
@@ -161,20 +170,32 @@ class MapElites:
         else:
             drawn = rng.integers(len(occupied), size=batch)
         parents = self._archive.elites(occupied[drawn])
+        # Drawn for every child, so that a lineage begins at an elite that its first birth had drawn.
+        slot, goes_on = self._stretch.slots(step)
+        latest = np.where(goes_on, self._lineages.rows(slot), NONE)
+        unselected = latest != NONE
+
+        def whose(name: str) -> NDArray[Any]:
+            of: NDArray[Any] = getattr(parents, name).copy()
+            of[unselected] = getattr(self._lineages, name)[latest[unselected]]
+            return of
+
         uid = self._first_uid(step) + np.arange(batch)
+        genotypes = zip(whose("genotype"), uid.tolist(), strict=True)
         return Offspring(
-            np.stack([self._child(*pair) for pair in zip(parents.genotype, uid.tolist(), strict=True)]),
+            np.stack([self._child(*pair) for pair in genotypes]),
             uid,
-            parents.uid,
-            parents.niche,
-            parents.depth + 1,
+            whose("uid"),
+            whose("niche"),
+            whose("depth") + 1,
+            unselected,
         )
 
     def _child(self, parent: NDArray[np.float32], uid: int) -> NDArray[np.float32]:
         return self._mutate(parent, keyed(self._config.seed, Purpose.MUTATION, uid))
 
     def _first_uid(self, step: int) -> int:
-        return 0 if step == 0 else self._config.initial + (step - 1) * self._config.batch
+        return 0 if step == 0 else self._stretch.uid(step)
 
     def _keep(self, offspring: Offspring, evaluation: Evaluation) -> pa.Table:
         fine = ~evaluation.failed
@@ -191,16 +212,31 @@ class MapElites:
         )
         accepted = np.zeros(len(offspring), bool)
         accepted[fine] = self._archive.add(candidates[fine])
+        self._lineages = self._gone_on(offspring, niche)
         if self._config.selection == "curiosity":
             self._curiosity.tell(offspring.parent_uid, accepted)
         return births.make_table(offspring, evaluation, child_niche=niche, accepted=accepted, step=self.step)
+
+    def _gone_on(self, offspring: Offspring, niche: NDArray[np.int64]) -> UnderWay:
+        """The lineages after some births of a step."""
+        if self.step == 0:
+            return self._lineages
+        slot = self._stretch.slots(self.step)[0][offspring.uid - self._first_uid(self.step)]
+        can = niche != NONE
+        if self._niches.outside == "absorb":
+            can &= niche < len(self._niches)
+        ours, ended = (slot != NONE) & can, (slot != NONE) & ~can
+        births = UnderWay(
+            slot[ours], offspring.genotype[ours], offspring.uid[ours], niche[ours], offspring.depth[ours]
+        )
+        return self._lineages.after(births, slot[ended])
 
     def _keys(self, uid: NDArray[np.int64], objective: NDArray[np.float64]) -> NDArray[np.float64]:
         """The key of each birth; the largest of a niche makes its elite."""
         match self._config.replacement:
             case "random":
                 # One uniform key each: the elite is a uniform sample of its niche's births.
-                size = self._config.initial if self.step == 0 else self._config.batch
+                size = self._config.initial if self.step == 0 else self._stretch.batch
                 keys = keyed(self._config.seed, Purpose.REPLACEMENT, self.step).random(size)
                 return keys[uid - self._first_uid(self.step)]
             case "first":

@@ -177,7 +177,7 @@ def rank_stability(
     def scores(some: TransitionCounts, number: int) -> Floats:
         chain = estimate(some, estimator)
         # Draws of their own, so that rankings do not agree for having been drawn alike.
-        return answer_for_niches(chain, replace(question, seed=seed + number)).value[ranked]
+        return answer_for_niches(chain, replace(question, seed=seed + number), roots=ranked).value[ranked]
 
     full = scores(counts, 0)
     spearman, births = np.empty((parts.size, repeats)), np.empty((parts.size, repeats))

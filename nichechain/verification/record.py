@@ -12,7 +12,7 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from nichechain.archive.read import Meta
+from nichechain.archive.read import Meta, calibrations_of
 from nichechain.births.joins import repeated
 from nichechain.births.table import NONE, Offspring
 from nichechain.core.columns import Columnar
@@ -20,6 +20,7 @@ from nichechain.domains.base import Evaluation
 from nichechain.niches import Niches
 from nichechain.search.config import BuildConfig
 from nichechain.search.elites import Elites
+from nichechain.search.lineages import Calibration, UnderWay
 from nichechain.verification.result import Check
 
 Ints = NDArray[np.int64]
@@ -36,7 +37,7 @@ class Births(Columnar):
     run, uid, parent_uid, depth, parent_niche, child_niche, step : (N,) int64 arrays
     behavior : (N, B) float64 array
     objective : (N,) float64 array
-    accepted : (N,) bool array
+    accepted, lineage : (N,) bool arrays
         False where null.
     failed : (N,) bool array
     reasons : (N,) array of str
@@ -53,6 +54,7 @@ class Births(Columnar):
     behavior: Floats
     objective: Floats
     accepted: Bools
+    lineage: Bools
     failed: Bools
     reasons: NDArray[np.object_]
 
@@ -80,6 +82,7 @@ class Births(Columnar):
             behavior=np.stack([real(name) for name in axes], axis=1),
             objective=real("objective"),
             accepted=table["accepted"].fill_null(False).to_numpy().astype(bool),
+            lineage=table["lineage"].fill_null(False).to_numpy().astype(bool),
             failed=table["failed"].is_valid().to_numpy().astype(bool),
             reasons=np.array(table["failed"].fill_null("").to_pylist(), object),
         )
@@ -100,12 +103,15 @@ class Run:
     config : BuildConfig
     first_uid, births : int
         Its births are those from ``first_uid`` on.
+    calibrations : tuple of Calibration
+        Those births that were added to its build, by their numbers within the run.
     """
 
     number: int
     config: BuildConfig
     first_uid: int
     births: int
+    calibrations: tuple[Calibration, ...] = ()
 
     @property
     def rows(self) -> slice:
@@ -122,11 +128,12 @@ def runs_of(meta: Meta) -> Iterator[Run]:
         If the configuration of a merged run is none.
     """
     if meta.origin is None:
-        yield Run(0, meta.config, 0, meta.births)
+        yield Run(0, meta.config, 0, meta.births, meta.calibrations)
     elif meta.origin["kind"] == "merged":
         for number, run in enumerate(meta.origin["runs"]):
             config = BuildConfig.from_json(run["config"])
-            yield Run(number, config, int(run["first_uid"]), int(run["births"]))
+            births = int(run["births"])
+            yield Run(number, config, int(run["first_uid"]), births, calibrations_of(run, births))
 
 
 def differs(first: NDArray[np.generic], second: NDArray[np.generic]) -> Bools:
@@ -161,7 +168,8 @@ _EARLIER = "parents are earlier births of the same run"
 _BORN = "elites are births that did not fail"
 _FOLLOW = "pending children follow the births"
 _PARENTS = "pending children have parents, niche and depth"
-ROOTED = (_INITIAL, _EARLIER, _BORN, _FOLLOW, _PARENTS)
+_UNDER_WAY = "lineages under way are births that did not fail"
+ROOTED = (_INITIAL, _EARLIER, _BORN, _FOLLOW, _PARENTS, _UNDER_WAY)
 """Without these a genotype cannot be traced to its root."""
 
 
@@ -319,4 +327,23 @@ def check_pending(pending: Offspring, births: Births, first: int) -> list[Check]
     return [
         Check.of(_FOLLOW, _GROUP, pending.uid != uid, uid),
         Check.of(_PARENTS, _GROUP, ~earlier | lost, uid),
+    ]
+
+
+def check_lineages(lineages: UnderWay, births: Births) -> list[Check]:
+    """Checks of lineages under way against the births that they stand at.
+
+    Parameters
+    ----------
+    lineages : UnderWay
+    births : Births
+    """
+    at = np.clip(lineages.uid, 0, max(0, len(births) - 1))
+    there = (lineages.uid == at) & ~births.failed[at]
+    odd = (lineages.niche != births.child_niche[at]) | (lineages.depth != births.depth[at])
+    return [
+        Check.of(_UNDER_WAY, _GROUP, ~there, lineages.uid),
+        Check.of(
+            "lineages under way have the niche and depth of their births", _GROUP, odd & there, lineages.uid
+        ),
     ]

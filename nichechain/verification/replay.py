@@ -14,6 +14,7 @@ from nichechain.domains.base import Domain, Evaluation
 from nichechain.execution import Executor
 from nichechain.niches import Niches
 from nichechain.search.elites import Elites
+from nichechain.search.lineages import UnderWay
 from nichechain.variation import Mutation
 from nichechain.verification.record import Ints, Run, differs, largest_difference
 from nichechain.verification.result import EVALUATION, GENOTYPES, Check
@@ -101,6 +102,7 @@ class Regrowth:
         Of all births.
     elites : Elites
     pending : Offspring
+    lineages : UnderWay
     wanted : (K,) int64 array
         Births whose genotypes are asked for, sorted.
     """
@@ -109,6 +111,7 @@ class Regrowth:
     parent_uid: Ints
     elites: Elites
     pending: Offspring
+    lineages: UnderWay
     wanted: Ints
     _apart: dict[int, float | None] = field(default_factory=dict)
 
@@ -121,7 +124,8 @@ class Regrowth:
     ) -> Iterator[Float32s]:
         """Those that are wanted, in order."""
         stored = dict(zip(self.elites.uid.tolist(), self.elites.genotype, strict=True))
-        stored |= dict(zip(self.pending.uid.tolist(), self.pending.genotype, strict=True))
+        for more in (self.pending, self.lineages):
+            stored |= dict(zip(more.uid.tolist(), more.genotype, strict=True))
         wanted = set(self.wanted.tolist())
         for run in self.runs:
             grown = replayed(
@@ -144,7 +148,11 @@ class Regrowth:
     def checks(self) -> list[Check]:
         """Whether stored genotypes are those that were grown, once all have been."""
         checks = []
-        for who, uids in (("elites", self.elites.uid), ("pending children", self.pending.uid)):
+        for who, uids in (
+            ("elites", self.elites.uid),
+            ("pending children", self.pending.uid),
+            ("lineages under way", self.lineages.uid),
+        ):
             odd = [int(uid) in self._apart for uid in uids]
             sizes = [self._apart.get(int(uid)) or 0.0 for uid in uids]
             checks.append(
@@ -161,7 +169,7 @@ class Regrowth:
 
     def _targets(self, run: Run) -> Ints:
         """Numbers within the run of all genotypes that are compared or wanted."""
-        uids = np.unique(np.concatenate([self.elites.uid, self.wanted]))
+        uids = np.unique(np.concatenate([self.elites.uid, self.lineages.uid, self.wanted]))
         own = uids[(uids >= run.first_uid) & (uids < run.first_uid + run.births)] - run.first_uid
         return np.concatenate([own, self.pending.uid])
 

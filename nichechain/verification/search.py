@@ -7,7 +7,7 @@ record has.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import cast
 
@@ -18,7 +18,9 @@ from numpy.typing import NDArray
 from nichechain.births.table import NONE, Offspring
 from nichechain.domains.base import Domain, Evaluation
 from nichechain.niches import Niches
+from nichechain.search.config import BuildConfig
 from nichechain.search.elites import Elites, SearchState
+from nichechain.search.lineages import Stretch, UnderWay
 from nichechain.search.map_elites import MapElites
 from nichechain.verification.record import Births, Bools, Run, differs, largest_difference
 from nichechain.verification.result import SEARCH, Check
@@ -62,11 +64,17 @@ def search_again(
     """
     # MAP-Elites asks no more of a domain than this.
     domain = cast(Domain, _NoGenotypes())
-    search = MapElites(domain, niches, lambda parent, _: parent, run.config)
     record = _Record(births.evaluation)
-    rows = []
-    while search.births < run.births:
-        rows.append(search.advance(record, run.births - search.births, on_done))
+    rows: list[pa.Table] = []
+    state = None
+    for config, end, stretch in _stretches(run):
+        if state is not None:
+            state = SearchState.at_rest(state.elites, state.births, state.step)
+        search = MapElites(domain, niches, lambda parent, _: parent, config, state, stretch=stretch)
+        while search.births < end:
+            rows.append(search.advance(record, end - search.births, on_done))
+        state = search.state
+    assert state is not None
     made = Births.of(pa.concat_tables(rows))
     numbered = replace(
         made,
@@ -74,14 +82,23 @@ def search_again(
         uid=made.uid + run.first_uid,
         parent_uid=_moved(made.parent_uid, run.first_uid),
     )
-    state = search.state
     elites = replace(state.elites, uid=state.elites.uid + run.first_uid)
     pending = replace(
         state.pending,
         uid=state.pending.uid + run.first_uid,
         parent_uid=_moved(state.pending.parent_uid, run.first_uid),
     )
-    return Again(numbered, replace(state, elites=elites, pending=pending))
+    lineages = replace(state.lineages, uid=state.lineages.uid + run.first_uid)
+    return Again(numbered, replace(state, elites=elites, pending=pending, lineages=lineages))
+
+
+def _stretches(run: Run) -> Iterator[tuple[BuildConfig, int, Stretch]]:
+    """What each stretch of a run follows, and with how many births it ends: the build, then calibrations."""
+    built = run.calibrations[0].first_uid if run.calibrations else run.births
+    yield run.config, built, Stretch.of_build(run.config)
+    uniform = replace(run.config, selection="uniform")
+    for each in run.calibrations:
+        yield uniform, min(each.end, run.births), each.stretch(uniform)
 
 
 def check_search(births: Births, again: Births) -> list[Check]:
@@ -95,9 +112,11 @@ def check_search(births: Births, again: Births) -> list[Check]:
         The same births, made again.
     """
     parents = (births.parent_uid != again.parent_uid) | (births.parent_niche != again.parent_niche)
+    lineage = births.lineage != again.lineage
     kept = births.accepted != again.accepted
     return [
         _check("parents are those that the seed draws", parents, births.uid),
+        _check("births of lineages are flagged, and no others", lineage, births.uid),
         _check("births belong to the step of their uid", births.step != again.step, births.uid),
         _check("births are accepted that have the largest key so far", kept, births.uid),
     ]
@@ -141,7 +160,20 @@ def check_pending_again(pending: Offspring, again: Offspring) -> list[Check]:
         ]
     wrong = (pending.uid != again.uid) | (pending.parent_uid != again.parent_uid)
     wrong |= (pending.parent_niche != again.parent_niche) | (pending.depth != again.depth)
+    wrong |= pending.lineage != again.lineage
     return [_check("pending children are the rest of the last step", wrong, pending.uid)]
+
+
+def check_lineages_again(lineages: UnderWay, again: UnderWay) -> list[Check]:
+    """Whether lineages under way are those that follow from the births."""
+    name = "lineages under way are at their latest births"
+    if len(lineages) != len(again):
+        uids = tuple(again.uid[:1].tolist()) or tuple(lineages.uid[:1].tolist())
+        number = max(len(lineages), len(again))
+        return [Check(name, _GROUP, number, number, uids, None, SEARCH)]
+    wrong = (lineages.slot != again.slot) | (lineages.uid != again.uid)
+    wrong |= (lineages.niche != again.niche) | (lineages.depth != again.depth)
+    return [_check(name, wrong, lineages.uid)]
 
 
 def _check(name: str, wrong: Bools, uids: NDArray[np.int64], difference: float | None = None) -> Check:

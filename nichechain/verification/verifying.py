@@ -11,7 +11,6 @@ import numpy as np
 
 from nichechain.archive import read
 from nichechain.archive.archive import Archive, load
-from nichechain.births.table import Offspring
 from nichechain.core.checks import check_at_least, check_seed
 from nichechain.core.errors import NichechainError
 from nichechain.core.machine import library_versions, machine
@@ -19,13 +18,19 @@ from nichechain.core.randomness import Purpose, keyed
 from nichechain.domains.base import Domain, Evaluation
 from nichechain.execution import Executor, Threads
 from nichechain.execution.base import WORKER_DIED
-from nichechain.search.elites import Elites
+from nichechain.search.elites import Elites, SearchState
 from nichechain.search.making import make_niches
 from nichechain.verification import record
 from nichechain.verification.record import Births, Ints, Run, largest_difference, runs_of
 from nichechain.verification.replay import Regrowth, check_evaluations, evaluated
 from nichechain.verification.result import EVALUATION, SEARCH, Check, Difference, Verification
-from nichechain.verification.search import check_pending_again, check_search, check_winners, search_again
+from nichechain.verification.search import (
+    check_lineages_again,
+    check_pending_again,
+    check_search,
+    check_winners,
+    search_again,
+)
 
 
 @dataclass(frozen=True)
@@ -149,14 +154,15 @@ class _Work:
         if self.checks[-1].mismatches:
             self.unverified.append("everything else: it is not known which births are of which run")
             return
-        pending = read.read_state(self.archive.folder, meta).pending
+        state = read.read_state(self.archive.folder, meta)
         elites = self.archive.elites
         self.checks += record.check_ancestry(births, runs)
         self.checks += record.check_elites(elites, births, niches)
         if meta.origin is None:
-            self.checks += record.check_pending(pending, births, len(births))
-        self._search(births, runs, pending)
-        self._genotypes(births, runs, pending)
+            self.checks += record.check_pending(state.pending, births, len(births))
+            self.checks += record.check_lineages(state.lineages, births)
+        self._search(births, runs, state)
+        self._genotypes(births, runs, state)
 
     def _broken(self, *names: str) -> bool:
         """Whether one of the checks of that name found something."""
@@ -174,7 +180,7 @@ class _Work:
         tell(0)
         return tell
 
-    def _search(self, births: Births, runs: list[Run], pending: Offspring) -> None:
+    def _search(self, births: Births, runs: list[Run], state: SearchState) -> None:
         if self._broken(record.COMPLETE):
             self.unverified.append("the search: without the niches of all births it cannot be made again")
             return
@@ -192,7 +198,8 @@ class _Work:
         winners = Elites.concatenate([again.state.elites for again in made]).winners()
         self.checks += check_winners(self.archive.elites, winners)
         if self.archive.meta.origin is None:
-            self.checks += check_pending_again(pending, made[0].state.pending)
+            self.checks += check_pending_again(state.pending, made[0].state.pending)
+            self.checks += check_lineages_again(state.lineages, made[0].state.lineages)
 
     def _tessellation(self) -> None:
         """Whether the centroids that are kept are those that the configuration's seed gives."""
@@ -203,7 +210,7 @@ class _Work:
                 Check("the tessellation is that of its seed", "search", 1, int(odd), (), None, SEARCH)
             )
 
-    def _genotypes(self, births: Births, runs: list[Run], pending: Offspring) -> None:
+    def _genotypes(self, births: Births, runs: list[Run], state: SearchState) -> None:
         try:
             domain, mutate = self.archive.domain, self.archive.mutate
         except NichechainError as error:
@@ -227,7 +234,7 @@ class _Work:
         self.sampled_elites, self.sampled_births = len(chosen), len(some)
         evaluating = self._tell("evaluations", len(chosen) + len(some))
         if rooted:
-            regrowth = Regrowth(runs, births.parent_uid, elites, pending, some)
+            regrowth = Regrowth(runs, births.parent_uid, elites, state.pending, state.lineages, some)
             making = self._tell("genotypes", regrowth.needed())
             grown = regrowth.genotypes(domain, mutate, making)
             again = evaluated(domain, grown, axes, self.executor, evaluating)

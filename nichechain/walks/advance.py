@@ -134,7 +134,8 @@ class Walks:
         uid = np.broadcast_to(np.arange(width), (len(run), width))
         none = np.full(uid.size, NONE, np.int64)
         depth = np.zeros(uid.size, np.int64)
-        offspring = Offspring(first.reshape(-1, length), uid.ravel(), none, none, depth)
+        nobody = np.zeros(uid.size, bool)
+        offspring = Offspring(first.reshape(-1, length), uid.ravel(), none, none, depth, nobody)
         archives = 1 if self._config.archive.scope == "configuration" else len(run)
         axes = evaluation.behavior.shape[1]
         state = WalkState(
@@ -259,6 +260,7 @@ class Walks:
             np.repeat(state.uid.ravel(), each),
             np.repeat(state.niche.ravel(), each),
             np.repeat(state.depth.ravel() + 1, each),
+            np.zeros(walks * width * each, bool),
         )
 
     def _around(self, state: WalkState, children: Floats) -> Surroundings:

@@ -111,6 +111,7 @@ def test_births_as_a_data_frame(arm: Archive) -> None:
         "accepted": "boolean",
         "failed": "string",
         "step": "Int32",
+        "lineage": "boolean",
     }
     assert births["uid"].tolist() == list(range(800))
     initial = births["uid"] < 50

@@ -14,7 +14,8 @@ import numpy as np
 import pytest
 from numpy.typing import ArrayLike, NDArray
 
-from nichechain.archive import building, read, write
+from nichechain.archive import filling as building
+from nichechain.archive import read, write
 from nichechain.archive.building import BuildProgress, build
 from nichechain.core.errors import ArchiveError, NichechainError
 from nichechain.domains import Evaluation, PlanarArm

@@ -20,7 +20,7 @@ ROOT = Path(nichechain.__file__).parents[1]
 
 SCRIPT = """
 import sys, time
-from nichechain.archive import building
+from nichechain.archive import filling as building
 from nichechain import cli, domains
 from nichechain.archive import write
 from nichechain.domains import PlanarArm

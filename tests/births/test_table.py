@@ -28,6 +28,7 @@ def _four_births(parent_uid, parent_niche, child_niche, failed):
         np.array(parent_uid, np.int64),
         np.array(parent_niche, np.int64),
         np.arange(n),
+        np.arange(n) == 1,
     )
     accepted = (np.arange(n) % 2 == 0) & ~failed
     return births.make_table(
@@ -49,6 +50,7 @@ def test_the_schema_is_the_documented_one():
         ("accepted", pa.bool_()),
         ("failed", pa.string()),
         ("step", pa.int32()),
+        ("lineage", pa.bool_()),
     ]
 
 
@@ -70,6 +72,7 @@ def test_a_table_by_hand():
         "accepted": [True, False, True, False],
         "failed": [None, "physics is unstable", None, None],
         "step": [6, 6, 6, 6],
+        "lineage": [False, True, False, False],
     }
 
 
@@ -92,7 +95,9 @@ def test_a_table_of_no_births():
 
 def test_offspring_are_cut_alike_in_every_field():
     offspring = Offspring(
-        np.arange(10, dtype=np.float32).reshape(5, 2), *(np.arange(5) + 10 * k for k in range(1, 5))
+        np.arange(10, dtype=np.float32).reshape(5, 2),
+        *(np.arange(5) + 10 * k for k in range(1, 5)),
+        np.arange(5) == 2,
     )
     cut = offspring[1:3]
     assert len(cut) == 2
@@ -103,3 +108,6 @@ def test_offspring_are_cut_alike_in_every_field():
         [31, 32],
         [41, 42],
     ]
+    assert cut.lineage.tolist() == [False, True]
+    assert len(Offspring.none(7)) == 0
+    assert Offspring.none(7).genotype.shape == (0, 7)

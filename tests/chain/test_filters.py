@@ -33,6 +33,7 @@ def births(size=300, seed=0):
             "accepted": rng.random(size) < 0.5,
             "failed": pd.array([None] * size, "string"),
             "step": np.arange(size) // 30,
+            "lineage": rng.random(size) < 0.3,
         }
     )
     frame.loc[initial, ["parent_uid", "parent_niche"]] = pd.NA
@@ -51,6 +52,8 @@ def table(frame):
         ({"run": 1}, lambda f: f["run"] == 1),
         ({"steps": (2, 5)}, lambda f: (f["step"] >= 2) & (f["step"] < 5)),
         ({"accepted": True}, lambda f: f["accepted"]),
+        ({"lineages": True}, lambda f: f["lineage"]),
+        ({"lineages": False}, lambda f: ~f["lineage"]),
         (
             {"run": 0, "steps": (0, 1), "accepted": True},
             lambda f: (f["run"] == 0) & (f["step"] == 0) & f["accepted"],

@@ -130,7 +130,7 @@ def test_unknown_domain(tmp_path, capsys):
 def test_interrupt_keeps_what_is_done_and_says_how_to_go_on(tmp_path):
     folder = tmp_path / "arm"
     script = (
-        "import sys, nichechain.cli as cli; from nichechain.archive import building\n"
+        "import sys, nichechain.cli as cli; from nichechain.archive import filling as building\n"
         "building.CHECKPOINT_SECONDS = 0.2\n"
         f"sys.exit(cli.main({build(folder, 100_000)!r}))\n"
     )

@@ -446,6 +446,21 @@ def test_a_posterior_of_the_offspring_is_nearer_to_the_truth_than_their_shares()
     assert posterior == pytest.approx(exact, rel=0.2)
 
 
+def test_by_default_the_row_is_worth_what_siblings_make_likely():
+    niches = GridNiches((3, 3), ((0.0, 3.0), (0.0, 3.0)))
+    rng = np.random.default_rng(8)
+    # Three elites of each niche whose children keep to two niches each: what the row says is worth little.
+    elite = np.repeat(np.arange(27), 20)
+    child = rng.integers(9, size=(27, 2))[elite, rng.integers(2, size=elite.size)]
+    chain = estimate(TransitionCounts.from_births(elite // 3, child, niches, elite=elite))
+    archive, root = _plane(chain)
+    options = {"l": 2, "lineages": 20, "offspring": 10, "draws": 10, "chain": chain}
+    found = genotype_evolvability(archive, root, **options)
+    concentration = chain.posterior.elite_concentration
+    assert concentration < 5 < chain.posterior.strength
+    assert found == genotype_evolvability(archive, root, strength=concentration, **options)
+
+
 def test_offspring_leave_their_distribution_open_though_t_is_given(plane_chain):
     archive, elite = _plane(plane_chain)
     given_t = NicheChain(plane_chain.T, niches=GRID, outside=9)

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import itertools
+from contextlib import suppress
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -12,6 +13,8 @@ from matplotlib.figure import Figure
 import nichechain as nc
 from nichechain import domains, studies, validation, variation
 from nichechain.archive import read
+from nichechain.archive.imported import import_births
+from nichechain.archive.merge import merge
 from nichechain.chain.counts import TransitionCounts
 from nichechain.domains.policies.controllers import MLP
 from nichechain.evolvability.reach import reach
@@ -36,6 +39,18 @@ class _Here:
         return domain.evaluate(genotypes)
 
 
+class _Stopped(_Here):
+    """One that is stopped at its second call."""
+
+    calls = 0
+
+    def evaluate(self, domain: Any, genotypes: Any, on_done: Any = None) -> Any:
+        self.calls += 1
+        if self.calls == 2:
+            raise KeyboardInterrupt
+        return super().evaluate(domain, genotypes, on_done)
+
+
 def _scheduler() -> Any:
     from ribs.archives import GridArchive
     from ribs.emitters import GaussianEmitter
@@ -58,11 +73,16 @@ def world(tmp_path_factory: pytest.TempPathFactory) -> SimpleNamespace:
     given = nc.NicheChain(np.array([[0.5, 0.5, 0.0], [0.1, 0.6, 0.3], [0.0, 0.2, 0.8]]))
     for name, other in (
         ("again", nc.BuildConfig("arm", (5, 5), arm.bounds, evaluations=400, scale=0.2, seed=1)),
+        ("spare", config),
         ("other", nc.BuildConfig("arm", (4, 5), arm.bounds, evaluations=400, scale=0.2, seed=2)),
     ):
         with nc.Threads(1) as threads:
             nc.build(other, folder / name, threads)
     (folder / "log.csv").write_text("parent_niche,child_niche\n0,1\n1,2\n")
+    import_births(folder / "log.csv", folder / "imported", counts.niches)
+    merge((folder / "arm", folder / "again"), folder / "merged")
+    with suppress(KeyboardInterrupt):
+        nc.build(config, folder / "unfinished", _Stopped())
     study = studies.Study(
         "pressure", "arm", (studies.Condition("a", offspring=2),), 1, 0, (2, 2), ((0, 1), (0, 1))
     )
@@ -82,6 +102,10 @@ def world(tmp_path_factory: pytest.TempPathFactory) -> SimpleNamespace:
         here=here,
         again=folder / "again",
         other=folder / "other",
+        spare=folder / "spare",
+        imported=folder / "imported",
+        merged=folder / "merged",
+        unfinished=folder / "unfinished",
         other_config=other,
         log=folder / "log.csv",
         study=folder / "study",

@@ -182,7 +182,7 @@ EXEMPT: dict[tuple[str, str], str] = {
         ("archive.imported.Axes", "names unit", _TEXT),
         (
             "archive.imported.Columns",
-            "parent child run uid elite step",
+            "parent child run uid elite step lineage",
             "names of columns, which import_births looks for",
         ),
         ("search.config.BuildConfig", "domain outside mutation", _LATER),

@@ -86,6 +86,8 @@ CALLS = (
             "step_bound": ("rescaled", ("rescaled", "a"), ("rescaled",)),
             "layer_scales": (("a",),),
             "selection": UNKNOWN,
+            "lineage_share": (1.0, *SHARE),
+            "lineage_length": whole(1),
         },
     ),
     Call(
@@ -131,6 +133,20 @@ CALLS = (
         },
     ),
     Call(
+        "calibrate",
+        lambda w: {"archive": w.spare, "rollouts": 3, "executor": w.here},
+        {
+            "archive": (
+                *_NO_FOLDER,
+                Made(lambda w: w.imported, "imported"),
+                Made(lambda w: w.merged, "merged"),
+                Made(lambda w: w.unfinished, "unfinished"),
+            ),
+            "rollouts": (None, *whole(0)),
+            "max_failed": SHARE,
+        },
+    ),
+    Call(
         "archive.merge.merge",
         lambda w: {"folders": (w.archive.folder, w.again), "out": w.fresh()},
         {
@@ -161,7 +177,10 @@ CALLS = (
                 _written("bad.parquet", "PAR1"),
             ),
             "folder": (Made(lambda w: w.archive.folder, "an-archive"),),
-            "columns": (Columns(parent="no-such-column"),),
+            "columns": (
+                Columns(parent="no-such-column"),
+                Made(lambda w: Columns(lineage="child_niche"), "no-flag"),
+            ),
             "axes": (Axes(names=("x",)),),
         },
     ),

@@ -48,6 +48,8 @@ def test_json_names_every_field() -> None:
         ({"initial": 0}, "initial is 0, but must be at least 1"),
         ({"batch": 0}, "batch is 0, but must be at least 1"),
         ({"seed": -1}, "seed is -1, but must not be negative"),
+        ({"lineage_share": 1.0}, "lineage_share is 1, but must be a share of births, from 0 to below 1"),
+        ({"lineage_length": 1}, "lineage_length is 1, but must be at least 2"),
         ({"domain_seed": -1}, "domain_seed is -1, but must not be negative"),
         (
             {"replacement": "best"},
@@ -73,6 +75,12 @@ def test_a_value_that_an_earlier_version_did_not_know_is_its_default() -> None:
     values = dataclasses.replace(ARM, seed=BuildConfig.seed).to_json()
     del values["seed"]
     assert BuildConfig.from_json(values) == dataclasses.replace(ARM, seed=BuildConfig.seed)
+
+
+def test_a_build_of_before_there_were_lineages_has_none() -> None:
+    values = ARM.to_json()
+    del values["lineage_share"], values["lineage_length"]
+    assert BuildConfig.from_json(values) == dataclasses.replace(ARM, lineage_share=0.0)
 
 
 def test_is_immutable() -> None:

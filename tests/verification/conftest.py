@@ -80,6 +80,10 @@ class Forgery:
         """Values of a child that waits."""
         self._alter("pending", row, values)
 
+    def lineage(self, row: int, **values: object) -> None:
+        """Values of a lineage under way."""
+        self._alter("lineages", row, values)
+
     def drop_elite(self, row: int) -> None:
         """Leave an elite out."""
         kept = np.arange(len(self.state.elites)) != row

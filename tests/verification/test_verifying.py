@@ -261,6 +261,25 @@ def _pending(name: str, change: Callable[[Any], Any]) -> Callable[[Forgery], int
     return alter
 
 
+def _under_way(name: str, change: Callable[[Any], Any]) -> Callable[[Forgery], int]:
+    def alter(forgery: Forgery) -> int:
+        lineages = forgery.state.lineages
+        forgery.lineage(1, **{name: change(getattr(lineages, name)[1])})
+        return int(forgery.state.lineages.uid[1])
+
+    return alter
+
+
+def _flag(lineage: bool) -> Callable[[Forgery], int]:
+    def alter(forgery: Forgery) -> int:
+        births = forgery.births
+        uid = int(births["uid"][(births["uid"] >= 50) & (births["lineage"] != lineage)].iloc[3])
+        forgery.set(uid, lineage=lineage)
+        return uid
+
+    return alter
+
+
 @pytest.mark.parametrize(
     ("alter", "name"),
     [
@@ -294,6 +313,13 @@ def _pending(name: str, change: Callable[[Any], Any]) -> Callable[[Forgery], int
         (_pending("genotype", _one_weight), "genotypes of pending children grow from their roots"),
         (_pending("depth", lambda depth: depth + 1), "pending children have parents, niche and depth"),
         (_pending("parent_uid", lambda uid: uid - 1), "pending children are the rest of the last step"),
+        (_pending("lineage", lambda lineage: not lineage), "pending children are the rest of the last step"),
+        (_flag(True), "births of lineages are flagged, and no others"),
+        (_flag(False), "births of lineages are flagged, and no others"),
+        (_under_way("genotype", _one_weight), "genotypes of lineages under way grow from their roots"),
+        (_under_way("depth", lambda d: d + 1), "lineages under way have the niche and depth of their births"),
+        (_under_way("uid", lambda uid: uid - 1), "lineages under way are at their latest births"),
+        (_under_way("uid", lambda _: 999), "lineages under way are births that did not fail"),
     ],
 )
 def test_what_was_altered_is_found_and_named(

@@ -24,7 +24,8 @@ import os, random, signal, sys, time
 from pathlib import Path
 import ribs.archives
 import pyarrow.parquet
-from nichechain.archive import building, read, write
+from nichechain.archive import filling, read, write
+from nichechain.archive.building import build
 from nichechain.search.config import BuildConfig
 from nichechain.execution import Threads
 from nichechain.core.randomness import Purpose
@@ -33,8 +34,8 @@ folder, kills = Path(sys.argv[1]), int(sys.argv[2])
 config = BuildConfig("arm", (9, 7), ((-0.7, 1.0), (-0.9, 0.8)), evaluations=int(sys.argv[3]),
                      initial=100, batch=64, scale=0.3, seed=5)
 write.PART_ROWS = 200
-building.CHECKPOINT_SECONDS = -1.0
-building._COMMIT_SHARE = 1e9
+filling.CHECKPOINT_SECONDS = -1.0
+filling._COMMIT_SHARE = 1e9
 random.seed(kills)
 
 for kill in range(kills):
@@ -49,7 +50,7 @@ for kill in range(kills):
             os.write(say, b".")
         write.Writer.commit = committing
         with Threads(1) as executor:
-            building.build(config, folder, executor)
+            build(config, folder, executor)
         os._exit(0)
     os.close(say)
     os.read(ready, 1)

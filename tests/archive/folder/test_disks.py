@@ -193,7 +193,7 @@ from nichechain.archive.building import build
 from nichechain.search.config import BuildConfig
 from nichechain.core.errors import ArchiveError
 from nichechain.execution import Threads
-from nichechain.archive import building
+from nichechain.archive import filling as building
 from nichechain.archive.archive import load
 
 write.PART_ROWS = 1000

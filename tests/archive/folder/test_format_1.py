@@ -21,8 +21,17 @@ ARCHIVE = Path(__file__).parents[2] / "data" / "format-1"
 def test_its_numbers_are_those_of_then() -> None:
     archive = load(ARCHIVE)
     assert archive.config == BuildConfig(
-        "arm", (9, 7), ((-0.7, 1.0), (-0.9, 0.8)), evaluations=1000, initial=100, batch=64, scale=0.3, seed=5
+        "arm",
+        (9, 7),
+        ((-0.7, 1.0), (-0.9, 0.8)),
+        evaluations=1000,
+        initial=100,
+        batch=64,
+        scale=0.3,
+        seed=5,
+        lineage_share=0.0,
     )
+    assert not archive.births()["lineage"].any()
     assert archive.meta.complete
     assert archive.meta.versions["nichechain"] == "0.1.0"
     assert archive.filled == 57
@@ -43,6 +52,7 @@ def test_its_numbers_are_those_of_then() -> None:
         "accepted",
         "failed",
         "step",
+        "lineage",
     ]
     assert births["uid"].tolist() == list(range(1000))
     assert births["failed"].notna().sum() == 95

@@ -11,7 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from nichechain.archive import building, read, write
+from nichechain.archive import filling as building
+from nichechain.archive import read, write
 from nichechain.archive.archive import load
 from nichechain.archive.building import build
 from nichechain.core.errors import ArchiveError
@@ -91,7 +92,7 @@ READER = """
 import sys
 from pathlib import Path
 import numpy as np
-from nichechain.archive import building, read, write
+from nichechain.archive import filling as building, read, write
 from nichechain.archive.archive import load
 
 folder, total = Path(sys.argv[1]), int(sys.argv[2])
