@@ -157,6 +157,7 @@ _CALLED = {
     "hidden": "activation",
     "layers": "weights_of_a_layer",
     "names": "(measure|axes|bounds)",
+    "niche": "state",
     "niches": "state",
     "offspring": "(behaviors|sample_size)",
     "other": "niches",
