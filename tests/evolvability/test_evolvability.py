@@ -460,10 +460,10 @@ def test_by_default_the_row_is_worth_what_siblings_make_likely():
     chain = estimate(TransitionCounts.from_births(elite // 3, child, niches, elite=elite))
     archive, root = _plane(chain)
     options = {"l": 2, "lineages": 20, "offspring": 10, "draws": 10, "chain": chain}
-    found = genotype_evolvability(archive, root, **options)
+    found = fresh(archive, root, **options)
     concentration = chain.posterior.elite_concentration
     assert concentration < 5 < chain.posterior.strength
-    assert found == genotype_evolvability(archive, root, strength=concentration, **options)
+    assert found == fresh(archive, root, strength=concentration, **options)
 
 
 def test_offspring_leave_their_distribution_open_though_t_is_given(plane_chain):
