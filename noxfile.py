@@ -99,7 +99,8 @@ def tests(session: nox.Session) -> None:
         needed = [line for line in PROJECT["dependencies"] if not line.startswith("torch")]
         session.install(*PINNED, *needed, *PROJECT["optional-dependencies"]["test"])
         session.install("--no-deps", "-e", ".")
-    session.run("python", "-m", "pytest", *(given if given or whole else SMOKE))
+    chosen = whole or any(not word.startswith("-") for word in given)
+    session.run("python", "-m", "pytest", *given, *(() if chosen else SMOKE))
 
 
 @nox.session

@@ -47,7 +47,8 @@ def recorded_children(archive: Archive, uids: Ints) -> sparse.csr_array:
 def own_strength(chain: NicheChain) -> float:
     """α: how many children of an elite its niche's row is worth, in foretelling where the next ones land.
 
-    :func:`nichechain.chain.elites.elite_concentration` of the chain's births; 1 where T has no posterior.
+    As many as make children of one elite foretell each other best, see
+    :func:`nichechain.chain.elites.elite_concentration`; 1 where T has no posterior.
     """
     return 1.0 if chain.posterior is None else chain.posterior.elite_concentration
 

@@ -9,6 +9,8 @@ import nichechain as nc
 from nichechain import NichechainError
 from nichechain.evolvability.record import draw_children, own_strength, recorded_children
 
+GRID = nc.GridNiches((3, 3), ((0.0, 3.0), (0.0, 3.0)))
+
 
 @pytest.fixture(scope="module")
 def arm(tmp_path_factory):
@@ -54,10 +56,25 @@ def test_several_genotypes_are_drawn_at_once():
     np.testing.assert_array_equal(drawn[1], rows[1])
 
 
-def test_the_strength_is_that_of_the_elites_of_the_births(arm):
-    chain = arm.chain()
-    assert own_strength(chain) == chain.posterior.elite_concentration
-    assert own_strength(arm.chain("mle")) == 1.0
+def test_the_strength_is_that_of_the_elites_that_were_simulated():
+    """Elites' laws ~ Dirichlet(a·row): siblings share a niche more often than cousins, by 1/(a + 1)."""
+    rng = np.random.default_rng(2)
+    row = np.full(9, 1 / 9)
+    parent, child, elite = [], [], []
+    for number in range(3000):
+        law = rng.dirichlet(20.0 * row)
+        child.append(rng.choice(9, 10, p=law))
+        parent.append(np.full(10, number % 9))
+        elite.append(np.full(10, number))
+    parent, child, elite = (np.concatenate(x) for x in (parent, child, elite))
+    counts = nc.TransitionCounts.from_births(parent, child, GRID, elite=elite)
+    assert own_strength(nc.estimate(counts)) == pytest.approx(20.0, rel=0.15)
+
+
+def test_the_strength_without_families_is_that_of_the_base():
+    counts = nc.TransitionCounts.from_pairs([0, 1, 1], [1, 2, 0], GRID)
+    assert own_strength(nc.estimate(counts, strength=7.0)) == 7.0
+    assert own_strength(nc.estimate(counts, "mle")) == 1.0
     assert own_strength(nc.NicheChain(np.eye(3))) == 1.0
 
 

@@ -134,7 +134,7 @@ def test_an_absorbing_outside_tells_nothing():
         ({"l": 0}, "l is 0"),
         ({"lineages": 0}, "lineages is 0"),
         ({"convention": "x"}, "convention is 'x'"),
-        ({"niche": 4}, "niche is 4"),
+        ({"niche": 5}, "niche is 5"),
     ],
 )
 def test_bad_input(options, message):

@@ -157,6 +157,7 @@ _CALLED = {
     "hidden": "activation",
     "layers": "weights_of_a_layer",
     "names": "(measure|axes|bounds)",
+    "niche": "state",
     "niches": "state",
     "offspring": "(behaviors|sample_size)",
     "other": "niches",
@@ -183,7 +184,7 @@ _ALLOWED = re.compile(
     # Of what kind values are not, and to what else a parameter belongs.
     r"|that are (no|not|negative)|which|belongs? to|nothing|no spread|neither|are missing"
     r"|has no|it has|the last is|up to|one to \d+|but \d+ axes|one scale per"
-    r"|not finite|either|differ|not negative|would be empty)\b"
+    r"|not finite|either|differ|not negative|would be empty|have an elite)\b"
 )
 """Words that say what would do instead."""
 

@@ -18,12 +18,8 @@ from nichechain.plots.style import LONG_JUMP
 
 
 @pytest.fixture(scope="module")
-def archive(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("maps") / "arm"
-    config = nc.BuildConfig("arm", (6, 9), ((-1, 1), (-1, 1)), evaluations=800, scale=0.5)
-    with nc.Threads(1) as threads:
-        nc.build(config, folder, threads)
-    return nc.load(folder)
+def archive(arm_archive):
+    return arm_archive
 
 
 @pytest.fixture
