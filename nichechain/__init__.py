@@ -21,6 +21,7 @@ if TYPE_CHECKING:
         NicheBand,
         NicheEvolvability,
         bootstrap_elites,
+        elite_evolvability,
         genotype_evolvability,
         l_evolvability,
         niche_evolvability,
@@ -54,6 +55,7 @@ __all__ = [
     "calibrate",
     "curiosity",
     "domains",
+    "elite_evolvability",
     "estimate",
     "from_ribs",
     "genotype_evolvability",
@@ -77,8 +79,8 @@ __getattr__, __dir__ = lazily(
     chain="NicheChain TransitionCounts estimate",
     core="ArchiveError NichechainError",
     domains="domains",
-    evolvability="Evolvability NicheBand NicheEvolvability bootstrap_elites genotype_evolvability "
-    "l_evolvability niche_evolvability prior_sensitivity",
+    evolvability="Evolvability NicheBand NicheEvolvability bootstrap_elites elite_evolvability "
+    "genotype_evolvability l_evolvability niche_evolvability prior_sensitivity",
     execution="Threads",
     landscape="landscape",
     niches="CVTNiches GridNiches Niches one_hot",

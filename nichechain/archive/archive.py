@@ -187,7 +187,7 @@ class Archive:
 
     def births(self) -> pd.DataFrame:
         """Every evaluated child, in order; the columns of :mod:`nichechain.births.table`."""
-        frame = read.read_births(self.folder, self.meta).to_pandas(types_mapper=_nullable)
+        frame = read.read_births(self.folder, self.meta).to_pandas(use_threads=False, types_mapper=_nullable)
         names = {f"behavior_{i}": f"behavior_{name}" for i, name in enumerate(self.meta.facts.behavior_names)}
         return frame.rename(columns=names)
 

@@ -18,6 +18,7 @@ from nichechain.births.joins import repeated
 from nichechain.births.table import NONE
 from nichechain.core.errors import ArchiveError, NichechainError
 from nichechain.core.files import writing
+from nichechain.core.parquet import read_parquet
 from nichechain.niches import Niches
 from nichechain.search.config import BuildConfig
 from nichechain.search.elites import Elites, SearchState
@@ -194,14 +195,19 @@ def write_archive(
 
 def _read(log: Path, content: bytes) -> pa.Table:
     import pyarrow.csv
-    import pyarrow.parquet
 
     kind = log.suffix.lower()
     if kind not in (".csv", ".parquet"):
         raise NichechainError(f"{log} is neither a .csv nor a .parquet file, which are what can be imported")
     try:
-        source = pa.BufferReader(content)
-        return pyarrow.csv.read_csv(source) if kind == ".csv" else pyarrow.parquet.read_table(source)
+        if kind == ".parquet":
+            return read_parquet(pa.BufferReader(content))
+        # The reader has a thread in any case, which must not be the last to hold Python's bytes.
+        own = pa.BufferOutputStream()
+        own.write(content)
+        return pyarrow.csv.read_csv(
+            pa.BufferReader(own.getvalue()), pyarrow.csv.ReadOptions(use_threads=False)
+        )
     except pa.ArrowException as error:
         reason = str(error).splitlines()[0]
         raise NichechainError(f"{log} cannot be read as {kind[1:].upper()}: {reason}") from error

@@ -7,10 +7,12 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
 from nichechain.archive import read, write
+from nichechain.births.table import NONE
 from nichechain.core.errors import ArchiveError, NichechainError
 from nichechain.core.files import writing
 from nichechain.niches import Niches
@@ -75,11 +77,19 @@ def merge(folders: Sequence[str | Path], out: str | Path) -> None:
     # Checked before anything is read at length.
     if read.is_archive(out):
         raise ArchiveError(f"{out} already holds an archive: merge into another folder")
-    tables, elites = [], []
+    tables: list[pa.Table] = []
+    elites: list[Elites] = []
     first_run = first_uid = 0
     for path, meta in zip(paths, metas, strict=True):
-        tables.append(_renumbered(read.read_births(path, meta), first_run, first_uid))
+        births = read.read_births(path, meta)
+        _check_ancestry(path, births)
+        tables.append(_renumbered(births, first_run, first_uid))
         own = read.read_state(path, meta).elites
+        if elites and own.genotype.shape[1] != elites[0].genotype.shape[1]:
+            raise NichechainError(
+                f"{paths[0]} has genotypes of {elites[0].genotype.shape[1]} parameters and {path} has "
+                f"{own.genotype.shape[1]}, but must have the same"
+            )
         elites.append(replace(own, uid=own.uid + first_uid))
         first_run += len(meta.origin["runs"]) if meta.origin is not None else 1
         first_uid += meta.births
@@ -147,6 +157,18 @@ def _same_search(first: dict[str, Any], second: dict[str, Any]) -> bool:
     # What an earlier version stored lacks the values that came later, and has lists for tuples.
     ours, theirs = BuildConfig.from_json(first), BuildConfig.from_json(second)
     return replace(ours, evaluations=theirs.evaluations) == theirs
+
+
+def _check_ancestry(path: Path, births: pa.Table) -> None:
+    """Refuse numbers given twice and parents that are no earlier births: no search leaves them behind."""
+    uid = births["uid"].fill_null(NONE).to_numpy()
+    run = births["run"].fill_null(NONE).to_numpy()
+    parent = births["parent_uid"].fill_null(NONE).to_numpy()
+    if (uid != np.arange(uid.size)).any():
+        raise ArchiveError(f"{path} does not number its births from 0, each once: verification says which")
+    born = parent != NONE
+    if (born & ((parent < 0) | (parent >= uid))).any() or (run[parent[born]] != run[born]).any():
+        raise ArchiveError(f"{path} has births whose parents are no earlier births: verification says which")
 
 
 def _renumbered(births: pa.Table, first_run: int, first_uid: int) -> pa.Table:

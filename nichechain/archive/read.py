@@ -22,6 +22,7 @@ import pyarrow.compute as pc
 
 from nichechain import births
 from nichechain.archive import untrusted
+from nichechain.archive.trust import check_origin
 from nichechain.births.table import LINEAGE, Offspring
 from nichechain.core.errors import ArchiveError
 from nichechain.core.text import printable_values
@@ -215,14 +216,15 @@ def _meta(values: dict[str, Any]) -> Meta:
     if sum(part["rows"] for part in parts) != total:
         raise ValueError(f"its parts do not add up to {total} births")
     origin = values.get("origin")
-    if origin is not None and origin["kind"] not in ("merged", "imported"):
-        raise ValueError(f"it is {origin['kind']!r}, which this version cannot read")
-    if origin is not None and origin["kind"] == "merged":
-        for run in origin["runs"]:
-            calibrations_of(run, int(run["births"]))
+    if origin is not None:
+        check_origin(origin)
+        for run in origin["runs"] if origin["kind"] == "merged" else ():
+            calibrations_of(run, run["births"])
     facts = values["domain"]
     start = facts["start"]
     names = tuple(str(name) for name in facts["behavior_names"])
+    if start is not None and (len(start) != len(names) or not all(map(math.isfinite, start))):
+        raise ValueError(f"its start is {start}, but must be a finite number for each axis of behavior")
     if len(names) != len(config.bounds):
         raise ValueError(f"it names {len(names)} axes of behavior, but has bounds for {len(config.bounds)}")
     return Meta(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
+from typing import Any
 
 from nichechain.core.errors import ArchiveError
 from nichechain.search.config import BuildConfig
@@ -43,3 +44,26 @@ def check_trusted(config: BuildConfig, folder: Path) -> None:
                 f"{folder} asks to import {module!r}: if you trust it, set {VARIABLE}={module} or give "
                 "load() the domain"
             )
+
+
+def check_origin(origin: dict[str, Any]) -> None:
+    """Refuse an account of where births come from that nobody here wrote.
+
+    Raises
+    ------
+    ValueError
+        If something is missing, or of another kind.
+    """
+    if origin["kind"] not in ("merged", "imported"):
+        raise ValueError(f"it is {origin['kind']!r}, which this version cannot read")
+    if origin["kind"] == "merged":
+        for run in origin["runs"]:
+            BuildConfig.from_json(run["config"])
+            if not (isinstance(run["births"], int) and isinstance(run["first_uid"], int)):
+                raise ValueError("it has a run whose births are not numbered")
+    for name, kind in (("columns", dict), ("emitters", list)):
+        if not isinstance(origin.get(name, kind()), kind):
+            raise ValueError(f"its {name} are no {kind.__name__}")
+    for emitter in origin.get("emitters", []):
+        if not {"emitter", "parent"} <= set(emitter):
+            raise ValueError("it has an emitter without a name or a parent")

@@ -26,7 +26,7 @@ from nichechain.archive.parquet_pages import decoded_size
 from nichechain.core.text import printable
 
 LONGEST_STRING = 1000
-"""Bytes of the longest string in a table that is believed."""
+"""Bytes of the longest string in a table, or characters in metadata, that is believed."""
 
 _SLACK = 1 << 20
 _NUMBER = 64
@@ -77,7 +77,23 @@ def read_object(content: bytes) -> dict[str, Any]:
     values = json.loads(content.decode("utf-8"))
     if not isinstance(values, dict):
         raise ValueError("it holds no object")
+    longest = _longest(values)
+    if longest > LONGEST_STRING:
+        raise ValueError(f"it has a text of {longest} characters, more than {LONGEST_STRING}")
     return values
+
+
+def _longest(values: Any) -> int:
+    """Characters of the longest text in a JSON value, keys included."""
+    match values:
+        case str():
+            return len(values)
+        case list():
+            return max(map(_longest, values), default=0)
+        case dict():
+            return max((max(len(name), _longest(value)) for name, value in values.items()), default=0)
+        case _:
+            return 0
 
 
 def read_arrays(
@@ -157,6 +173,7 @@ def read_table(
         # A string may be stored once and named in every row, so rows are only spelled out when
         # the longest is known.
         read_dictionary=texts,
+        pre_buffer=False,
         thrift_string_size_limit=_THRIFT,
         thrift_container_size_limit=_THRIFT,
     )
@@ -173,7 +190,9 @@ def read_table(
         size = sum(decoded_size(content, group.column(index)) for group in groups)
         if size > _SLACK + (LONGEST_STRING if name in texts else _NUMBER) * rows:
             raise ValueError(f"its column {name} claims to be larger than it can be")
-    table = file.read(columns if columns is None else [name for name in columns if name in schema.names])
+    # See nichechain.core.parquet on threads.
+    wanted = columns if columns is None else [name for name in columns if name in schema.names]
+    table = file.read(wanted, use_threads=False)
     if len(table) != rows:
         raise ValueError(f"it has {len(table)} rows, but {rows} were written")
     for name in texts:

@@ -5,10 +5,11 @@ from __future__ import annotations
 import re
 import shlex
 import sys
+import warnings
 from collections.abc import Sequence
 from dataclasses import KW_ONLY, dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
@@ -16,6 +17,9 @@ from nichechain.cli import output, parsing, progress
 from nichechain.core.checks import DomainOption, StepBound
 from nichechain.core.errors import ArchiveError, NichechainError
 from nichechain.search.config import MOST_FAILED, BuildConfig, SearchConfig
+
+if TYPE_CHECKING:
+    from nichechain.domains.base import Domain
 
 _GRID = "20x20"
 # Beyond so many niches, only those of the most births are scored, with few draws.
@@ -202,6 +206,8 @@ def run(arguments: Sequence[str]) -> int:
             domain = make_domain(config)
             # What goes wrong with it is for the build to say.
             execution.evaluate_rows(domain, domain.sample(1, seed=0))
+            if not read.is_archive(folder):
+                _check_constant(config, domain)
         try:
             with progress.build_progress(config.evaluations) as tell:
                 build(
@@ -220,6 +226,28 @@ def run(arguments: Sequence[str]) -> int:
             return 130
     _report(folder, shown)
     return 0
+
+
+def _check_constant(config: BuildConfig, domain: Domain) -> None:
+    """Warn of a domain of others whose behaviors are not functions of the genotype."""
+    from nichechain import execution
+    from nichechain.domains.constancy import inconstancy
+    from nichechain.domains.registry import is_proven
+    from nichechain.search.making import make_domain
+
+    if is_proven(config.domain):
+        return
+    found = inconstancy(
+        lambda rows: execution.evaluate_rows(domain, rows),
+        lambda rows: execution.evaluate_rows(make_domain(config), rows),
+        domain.sample(3, seed=config.seed),
+    )
+    if found is not None:
+        warnings.warn(
+            f"{config.domain} has something random that its seed does not fix: {found}, so that no birth can "
+            "be replayed or verified; what is random belongs to --noise or --repeats, which average over it",
+            stacklevel=2,
+        )
 
 
 def _report(folder: Path, shown: object) -> None:

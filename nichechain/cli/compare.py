@@ -31,6 +31,8 @@ class CompareCommand:
     """Archive folder, or the name of an archive that ships with nichechain."""
     second: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="B")]
     """Another: operators, seeds, searches or domains may differ, niches not."""
+    all_births: bool = False
+    """All births of all runs, not only as many of each as the shortest has."""
     l: int = 5
     """Generations to look ahead."""
     lineages: int = 100
@@ -69,6 +71,7 @@ def run(arguments: Sequence[str]) -> int:
             births[0],
             births[1],
             archives[0].niches,
+            align=not command.all_births,
             l=command.l,
             lineages=command.lineages,
             min_births=command.min_births,
@@ -97,10 +100,32 @@ def _show(found: Contrast) -> None:
         interval = f"{row.low:+.2f} to {row.high:+.2f}"
         table.add_row(name, f"{row.first:.2f}", f"{row.second:.2f}", f"{row.difference:+.2f}", interval)
     shown.print(table)
+    _warn(found)
     for name, (kind, number) in zip("AB", found.clusters, strict=True):
         shown.print(f"{name}: resampled over {number} {kind}")
     if any(kind == "elites" for kind, _ in found.clusters):
         shown.print(
             "One run says nothing of how runs differ: the interval is that of other elites within it. "
             "Merge several runs to have it over runs."
+        )
+
+
+def _warn(found: Contrast) -> None:
+    """Say what makes the two less comparable than they look."""
+    shown = output.console()
+    if found.aligned is None and found.recorded[0] != found.recorded[1]:
+        shown.print(
+            f"A has {found.recorded[0]} births and B {found.recorded[1]}, and all were used: where the level "
+            "drifts as a search goes on, that alone makes them differ."
+        )
+    if found.used != found.recorded:
+        shown.print(
+            f"Only the first {found.aligned} births of each run are compared, as many as the shortest has: "
+            f"{found.used[0]} of {found.recorded[0]} in A, {found.used[1]} of {found.recorded[1]} in B "
+            "(--all-births uses all)."
+        )
+    if found.shared:
+        shown.print(
+            f"The first {found.shared} births are the same in A and B: as far as that goes they are one "
+            "search, which says nothing of how two of them differ."
         )

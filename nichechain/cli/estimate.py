@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from nichechain.archive.archive import Archive
+    from nichechain.validation.drift import LevelCourse
     from nichechain.validation.held_out import Comparison
     from nichechain.validation.stability import RankStability
 
@@ -28,7 +29,7 @@ class EstimateCommand:
     compare: bool = False
     """Hold out the children of some elites and see which estimator foretells them best."""
     stability: bool = False
-    """Thin the births and see whether fewer would have ranked the niches alike."""
+    """Thin the births and see whether fewer would have ranked the niches alike, and how the level drifts."""
     estimator: parsing.EstimatorName = "empirical-bayes"
     """T from births: posteriors around a pooled or a uniform base, or row-normalised counts."""
     folds: Annotated[int | None, parsing.option("INT", "5")] = None
@@ -180,8 +181,9 @@ def _stability(command: EstimateCommand, archive: Archive) -> None:
             estimator=command.estimator,
             seed=command.seed,
         )
+        course = _course(command, archive)
     if command.out is not None:
-        _draw(found, command.out)
+        _draw(found, course, command.out)
     if command.format != "table":
         frame = found.to_frame()
         about = {
@@ -190,6 +192,8 @@ def _stability(command: EstimateCommand, archive: Archive) -> None:
             "thin": found.thin,
             "halves": found.halves.tolist(),
             "enough": found.enough,
+            "all_level": found.all_level,
+            "steps": [] if course is None else output.records(course.to_frame()),
         }
         _write(frame, {**about, "parts": output.records(frame)}, command)
         return
@@ -198,21 +202,61 @@ def _stability(command: EstimateCommand, archive: Archive) -> None:
         f"[bold]Ranking of {found.niches} niches[/] by {found.l}-evolvability, thinned births against all: "
         "Spearman's correlation"
     )
-    table = output.table("part", "births", "mean", "lowest", "highest")
+    table = output.table("part", "births", "mean", "lowest", "highest", "level")
     for row in found.to_frame().itertuples():
         values = (f"{value:.2f}" for value in (row.spearman, row.lowest, row.highest))
-        table.add_row(f"{row.fraction:.0%}", f"{row.births:.0f}", *values)
+        table.add_row(f"{row.fraction:.0%}", f"{row.births:.0f}", *values, f"{row.level:.1f}")
+    table.add_row("100%", str(found.all_births), "", "", "", f"{found.all_level:.1f}")
     shown.print(table)
+    if course is not None:
+        _show_course(course)
     shown.print(found.answer)
     if command.out is not None:
         shown.print(f"wrote {command.out}")
 
 
-def _draw(found: RankStability, out: Path) -> None:
-    from nichechain.plots.validation import plot_stability
+def _course(command: EstimateCommand, archive: Archive) -> LevelCourse | None:
+    """Level against steps and births; None where births say no step or are too few, or niches too many."""
+    from nichechain.archive.read import read_births
+    from nichechain.evolvability.question import MOST_EXACT
+    from nichechain.validation.drift import level_course
 
-    figure = output.new_figure(6.4, 4.8)
-    plot_stability(found, figure.add_subplot())
+    if archive.niches.states > MOST_EXACT:
+        return None
+    births = read_births(archive.folder, archive.meta)
+    try:
+        return level_course(births, archive.niches, seed=command.seed)
+    except NichechainError:
+        return None
+
+
+def _show_course(course: LevelCourse) -> None:
+    shown = output.console()
+    shown.print(
+        f"[bold]Level[/]: mean {course.l}-evolvability over {course.niches} niches that all parts of the "
+        "search observed, with 90 % intervals"
+    )
+    table = output.table("steps", "births", "level by these", "births so far", "level by all so far")
+    for row in course.to_frame().itertuples():
+        table.add_row(
+            f"{row.first_step} to {row.last_step}",
+            str(row.births),
+            f"{row.level:.1f} ± {row.level - row.low:.1f}",
+            str(row.grown),
+            f"{row.grown_level:.1f} ± {row.grown_level - row.grown_low:.1f}",
+        )
+    shown.print(table)
+
+
+def _draw(found: RankStability, course: LevelCourse | None, out: Path) -> None:
+    from nichechain.plots.validation import plot_level, plot_stability
+
+    panels = 1 if course is None else 2
+    figure = output.new_figure(6.4 * panels, 4.8)
+    axes = figure.subplots(1, panels, squeeze=False)[0]
+    plot_stability(found, axes[0])
+    if course is not None:
+        plot_level(course, axes[1])
     output.save_figure(figure, out, dpi=200)
 
 

@@ -32,9 +32,11 @@ class EvolvabilityCommand:
     niche: Annotated[str | None, parsing.option("I,J", "none")] = None
     """One niche, by grid index or number."""
     elite: Annotated[str | None, parsing.option("I,J", "none")] = None
-    """The genotype of a niche's elite: its own offspring are evaluated and begin the lineages."""
+    """The genotype of a niche's elite: the children recorded of it begin the lineages."""
+    rank: Annotated[Literal["niches", "elites"] | None, parsing.option("{niches,elites}", "niches")] = None
+    """What to rank: niches, or elites by the children recorded of each."""
     top: Annotated[int | None, parsing.option("INT", "10")] = None
-    """So many of the best niches."""
+    """So many of the best."""
     method: Literal["auto", "exact", "monte-carlo"] = "auto"
     """In closed form, or by the paper's simulation; auto is in closed form up to 1,000 states, and beyond
     simulates lineages on rows of T that are drawn where they are entered."""
@@ -47,8 +49,10 @@ class EvolvabilityCommand:
         parsing.option("{self,uniform,base,absorb}", "self"),
     ] = None
     """For mle: a row without births stays, goes anywhere, goes where most children go, or leaves for good."""
-    offspring: int = 30
-    """Offspring of an elite to evaluate."""
+    offspring: Annotated[int | None, parsing.option("INT", "0")] = None
+    """For --elite: so many offspring more, evaluated now."""
+    fresh_only: bool = False
+    """For --elite: only offspring evaluated now count, not those that are recorded."""
     min_births: int = 20
     """Niches with fewer births behind their row of T are not ranked."""
     draws: int = 50
@@ -83,12 +87,14 @@ def run(arguments: Sequence[str]) -> int:
     chain = archive.chain(command.estimator, unvisited=command.unvisited)
     if command.niche is not None or command.elite is not None:
         frame = _one(command, archive, chain)
+    elif command.rank == "elites":
+        frame = _best_elites(command, archive, chain)
     else:
         frame = _best(command, chain)
     frame["uncertainty"] = command.uncertainty
     if command.uncertainty != "posterior":
         _set_band(frame, command, archive)
-    _write(frame, command)
+    _write(frame, command, _drift(command, archive))
     return 0
 
 
@@ -97,18 +103,37 @@ def _check(command: EvolvabilityCommand) -> None:
     given = [name for name, value in chosen.items() if value is not None]
     if len(given) > 1:
         raise NichechainError(f"{' and '.join(given)} exclude each other: ask for one of them")
+    if command.rank is not None and (command.niche is not None or command.elite is not None):
+        one = "--niche" if command.niche is not None else "--elite"
+        raise NichechainError(f"--rank and {one} exclude each other: ask for one of them")
+    _check_elite(command)
     if command.uncertainty != "posterior":
         wanted = f"--uncertainty {command.uncertainty}"
         if command.elite is not None:
             raise NichechainError(f"{wanted} is of niches, but --elite asks for a genotype: ask for --niche")
+        if command.rank == "elites":
+            raise NichechainError(f"{wanted} is of niches, but --rank asks for elites: ask for niches")
         if command.estimator != "empirical-bayes":
             raise NichechainError(f"{wanted} belongs to empirical-bayes, not to {command.estimator}")
         if command.method == "monte-carlo":
             raise NichechainError(f"{wanted} is not computed by {command.method}")
-    for name in ("top", "offspring", "draws", "repeats"):
+    if command.rank == "elites" and command.method == "monte-carlo":
+        raise NichechainError(f"elites are ranked in closed form, not by {command.method}")
+    for name in ("top", "draws", "repeats"):
         if getattr(command, name) is not None:
             check_at_least(1, **{f"--{name}": getattr(command, name)})
     check_at_least(0, **{"--seed": command.seed, "--min-births": command.min_births})
+
+
+def _check_elite(command: EvolvabilityCommand) -> None:
+    """Refuse what belongs to --elite where it is not given."""
+    if command.offspring is not None:
+        check_at_least(0, **{"--offspring": command.offspring})
+    for name, given in {"--offspring": command.offspring, "--fresh-only": command.fresh_only}.items():
+        if given and command.elite is None:
+            raise NichechainError(f"{name} belongs to --elite, which is not given")
+    if command.fresh_only and not command.offspring:
+        raise NichechainError("--fresh-only needs offspring: give --offspring at least 1")
 
 
 def _one(command: EvolvabilityCommand, archive: Archive, chain: NicheChain) -> pd.DataFrame:
@@ -133,12 +158,13 @@ def _one(command: EvolvabilityCommand, archive: Archive, chain: NicheChain) -> p
         state = elite.state
         with (
             execution.make(command.workers, command.cache_memory) as executor,
-            progress.spinner("evaluating the elite's offspring"),
+            progress.spinner("following the elite's children"),
         ):
             result = genotype_evolvability(
                 archive,
                 elite,
-                offspring=command.offspring,
+                offspring=command.offspring or 0,
+                record=not command.fresh_only,
                 chain=chain,
                 executor=executor,
                 **command.asked(),
@@ -146,6 +172,31 @@ def _one(command: EvolvabilityCommand, archive: Archive, chain: NicheChain) -> p
     values = {name: value for name, value in asdict(result).items() if value is not None}
     root = {"niche": state, "index": archive.niches.label(state)}
     return pd.DataFrame([{**root, "root": "niche" if command.niche is not None else "elite", **values}])
+
+
+def _best_elites(command: EvolvabilityCommand, archive: Archive, chain: NicheChain) -> pd.DataFrame:
+    """The best elites, best first."""
+    from nichechain.evolvability import elite_evolvability
+
+    asked = {name: value for name, value in command.asked().items() if name not in ("method", "repeats")}
+    ranking = elite_evolvability(archive, chain=chain, **asked)
+    ranking = ranking[ranking["births"] >= command.min_births]
+    _check_enough(len(ranking), command)
+    frame = ranking.head(command.top or 10).copy()
+    frame.insert(2, "root", "elite")
+    for name in ("l", "lineages", "convention"):
+        frame[name] = getattr(command, name)
+    frame["method"], frame["estimator"] = "exact", chain.estimator
+    return frame
+
+
+def _check_enough(ranked: int, command: EvolvabilityCommand) -> None:
+    """Refuse an empty ranking."""
+    if not ranked:
+        raise NichechainError(
+            f"no niche has {command.min_births} births behind its row of T: "
+            "lower --min-births or build further"
+        )
 
 
 def _best(command: EvolvabilityCommand, chain: NicheChain) -> pd.DataFrame:
@@ -159,11 +210,7 @@ def _best(command: EvolvabilityCommand, chain: NicheChain) -> pd.DataFrame:
     # Only niches that are ranked have to be scored.
     births = np.zeros(chain.n_niches) if chain.births is None else chain.births[: chain.n_niches]
     ranked = np.flatnonzero(births >= command.min_births)
-    if not ranked.size:
-        raise NichechainError(
-            f"no niche has {command.min_births} births behind its row of T: "
-            "lower --min-births or build further"
-        )
+    _check_enough(ranked.size, command)
     draws = 1 if chain.posterior is None else command.draws
     with progress.counting(draws, "draws of T") as tell:
         scores = answer_for_niches(chain, question, roots=ranked, tell=tell)
@@ -173,6 +220,24 @@ def _best(command: EvolvabilityCommand, chain: NicheChain) -> pd.DataFrame:
     for name in ("l", "lineages", "method", "convention", "estimator", "saturated"):
         frame[name] = getattr(scores, name)
     return frame
+
+
+def _drift(command: EvolvabilityCommand, archive: Archive) -> str:
+    """What to say where early and late births disagree on the level, else nothing."""
+    from nichechain.archive.read import read_births
+    from nichechain.evolvability.question import MOST_EXACT
+    from nichechain.validation.drift import level_drift
+
+    # Beyond, a level in closed form would take longer than what was asked for.
+    if command.format != "table" or archive.niches.states > MOST_EXACT:
+        return ""
+    births = read_births(archive.folder, archive.meta)
+    try:
+        found = level_drift(births, archive.niches, l=command.l, lineages=command.lineages, seed=command.seed)
+    except NichechainError:
+        # Too few births to say so, or births without a step.
+        return ""
+    return found.answer if found.disagrees else ""
 
 
 def _set_band(frame: pd.DataFrame, command: EvolvabilityCommand, archive: Archive) -> None:
@@ -203,7 +268,7 @@ def _set_band(frame: pd.DataFrame, command: EvolvabilityCommand, archive: Archiv
     frame["high"] = frame["value"] + (band.high - band.value)[niche]
 
 
-def _write(frame: pd.DataFrame, command: EvolvabilityCommand) -> None:
+def _write(frame: pd.DataFrame, command: EvolvabilityCommand, drift: str) -> None:
     if command.format == "csv":
         print(frame.to_csv(index=False), end="")
         return
@@ -219,15 +284,18 @@ def _write(frame: pd.DataFrame, command: EvolvabilityCommand) -> None:
     shown.print(
         f"[dim]estimator: {first.estimator}; convention: {first.convention}; method: {first.method}[/]"
     )
-    if "offspring" in frame:
-        shown.print(f"[dim]lineages begin at the niches of {first.offspring} offspring evaluated now[/]")
+    if first.root == "elite":
+        shown.print(f"[dim]{_where_they_begin(frame, command)}[/]")
     # A given T has no interval; a niche of one elite has a bootstrap, though without spread.
     given = command.uncertainty == "posterior" and bool((frame["low"] == frame["high"]).all())
     columns = [first.root, "niches reached", *([] if given else [_LABELS[command.uncertainty]]), "± s.e."]
-    table = output.table(*columns, "births behind the row")
+    own = ["children"] if "recorded" in frame else []
+    table = output.table(*columns, "births behind the row", *own)
     for row in frame.itertuples():
         interval = [] if given else [f"{row.low:.2f} to {row.high:.2f}"]
-        table.add_row(row.index, f"{row.value:.2f}", *interval, f"{row.standard_error:.2f}", str(row.births))
+        recorded = [str(row.recorded)] if own else []
+        error = f"{row.standard_error:.2f}"
+        table.add_row(row.index, f"{row.value:.2f}", *interval, error, str(row.births), *recorded)
     shown.print(table)
     few = frame[frame["births"] < command.min_births]
     if len(few):
@@ -239,3 +307,21 @@ def _write(frame: pd.DataFrame, command: EvolvabilityCommand) -> None:
         shown.print(
             "Nearly all niches that can be reached are: fewer --lineages would tell roots apart better."
         )
+    if drift:
+        shown.print(drift)
+
+
+def _where_they_begin(frame: pd.DataFrame, command: EvolvabilityCommand) -> str:
+    """Whose children the first generation of an elite is drawn from."""
+    if command.rank == "elites":
+        none = int((frame["recorded"] == 0).sum())
+        without = f"; {none} without any begin as their niche does" if none else ""
+        return f"lineages begin at the niches of the children recorded of each elite{without}"
+    first = frame.iloc[0]
+    fresh = f"{first.offspring} offspring evaluated now" if command.offspring else ""
+    if first.recorded:
+        recorded = f"{first.recorded} recorded children"
+        return f"lineages begin at the niches of {recorded}{' and of ' if fresh else ''}{fresh}"
+    if fresh:
+        return f"lineages begin at the niches of {fresh}"
+    return "no children are recorded of this elite: lineages begin as its niche does (see --offspring)"

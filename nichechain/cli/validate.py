@@ -89,7 +89,7 @@ def _show(result: Validation, config: ValidationConfig) -> None:
     for test in result.tests:
         table.add_row(
             test.name,
-            f"{test.ratio:.3f}",
+            _number(test.ratio, ".3f"),
             f"{test.p_value:.3f}",
             f"{test.niches} of {test.all_niches}",
             f"{test.births} of {test.all_births}",
@@ -125,10 +125,10 @@ def _show(result: Validation, config: ValidationConfig) -> None:
                 f"{row.reached:.2f}",
                 f"{row.predicted:.2f}",
                 f"{row.bias:+.2f}±{row.bias_high - row.bias:.2f}",
-                f"{row.spearman:.2f}",
-                f"{row.spearman_low:.2f}, {row.spearman_high:.2f}",
-                f"{row.slope:.2f}",
-                f"{row.covered:.0%}",
+                _number(row.spearman),
+                f"{_number(row.spearman_low)}, {_number(row.spearman_high)}",
+                _number(row.slope),
+                _number(row.covered, ".0%"),
             )
         shown.print(table)
     shown.print(
@@ -137,3 +137,8 @@ def _show(result: Validation, config: ValidationConfig) -> None:
         "the chain's, above 1 where elites differ more than it says; in 90 %: elites within the\n"
         "chain's 90 % interval[/]"
     )
+
+
+def _number(value: float, form: str = ".2f") -> str:
+    """A number, or a dash where there is none, as between values that are all alike."""
+    return "-" if value != value else format(value, form)

@@ -29,7 +29,7 @@ class Episode:
         What the environment observed, flat and without noise: the first is that of the reset, the
         last that after the last action.
     actions : (T, ...) array
-        What the environment was given.
+        What the environment was given; of objects, where an action is a tuple or a dict.
     rewards : (T,) float64 array
     infos : tuple of T + 1 dict
         As ``reset`` and ``step`` returned them.
@@ -204,9 +204,11 @@ def named(text: str) -> tuple[Descriptor, tuple[str, ...] | None]:
 
 
 def _precision(observation: Any) -> np.dtype[np.floating[Any]]:
-    """The precision of an observation: of a dict, the longest of its arrays'."""
-    parts = observation.values() if isinstance(observation, Mapping) else [observation]
-    return max((precision_of(part) for part in parts), key=lambda kind: kind.itemsize)
+    """The precision of an observation: of a dict or tuple, the longest of its arrays'."""
+    if isinstance(observation, (Mapping, tuple)):
+        parts = observation.values() if isinstance(observation, Mapping) else observation
+        return max(map(_precision, parts), key=lambda kind: kind.itemsize)
+    return precision_of(observation)
 
 
 def _is_number(word: str) -> bool:

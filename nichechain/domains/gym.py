@@ -17,7 +17,7 @@ from nichechain.domains.descriptors import Descriptor, Episode, FinalObservation
 from nichechain.domains.noise import Noise, average, check_repeats, check_seeds, evaluation_seeds
 from nichechain.domains.policies.controllers import MLP, Controller
 from nichechain.domains.policies.networks import network
-from nichechain.domains.policies.spaces import Actions, Observations, actions_of
+from nichechain.domains.policies.spaces import Actions, Observations, actions_of, stacked
 from nichechain.niches import parse_bounds
 from nichechain.niches.base import check_bounds, precision_of
 
@@ -80,8 +80,10 @@ class GymDomain:
 
     Notes
     -----
-    Actions: the outputs of the policy, in [-1, 1], span the bounds of a Box; of Discrete actions
-    the one with the largest output is taken. The objective is the sum of rewards.
+    Actions: the outputs of the policy, in [-1, 1], span the bounds of a Box; of Discrete and
+    MultiDiscrete actions those with the largest outputs are taken, of MultiBinary ones those with
+    outputs above 0; a Tuple or Dict of these shares the outputs among them. The
+    objective is the sum of rewards.
 
     A descriptor named by a text ``module:function`` is imported when the first episode is
     evaluated, never before.
@@ -345,7 +347,7 @@ class GymDomain:
             infos.append(info)
         return Episode(
             np.array(observations),
-            np.array(actions),
+            stacked(actions),
             np.array(rewards),
             tuple(infos),
             bool(terminated),

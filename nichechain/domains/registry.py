@@ -94,6 +94,11 @@ def make(name: str, *, seed: int = 0, **options: DomainOption) -> Domain:
     return domain
 
 
+def is_proven(name: str) -> bool:
+    """Whether it is one of nichechain's own domains, whose tests prove that they are pure."""
+    return name in _BUILT_IN
+
+
 def _entry_points() -> dict[str, EntryPoint]:
     return {point.name: point for point in entry_points(group=GROUP)}
 

@@ -7,6 +7,7 @@ the paper demands. Under ``procedure`` the root's state counts, as its steps say
 """
 
 from nichechain.evolvability.coverage import expected_coverage, rarefied_coverage, sampled_coverage
+from nichechain.evolvability.elites import elite_evolvability
 from nichechain.evolvability.genotypes import FirstGeneration, genotype_evolvability
 from nichechain.evolvability.niches import l_evolvability, niche_evolvability
 from nichechain.evolvability.question import DRAWS, Convention, Method, Question
@@ -28,6 +29,7 @@ __all__ = [
     "Reach",
     "VisitMetrics",
     "bootstrap_elites",
+    "elite_evolvability",
     "evolvability_derivative",
     "expected_coverage",
     "genotype_evolvability",

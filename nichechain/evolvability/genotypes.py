@@ -1,4 +1,4 @@
-"""l-evolvability of a genotype: its own offspring begin the lineages."""
+"""l-evolvability of a genotype: its own children, recorded or evaluated now, begin the lineages."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ from nichechain.core.randomness import Purpose, keyed
 from nichechain.evolvability.averaging import Sample, one_root
 from nichechain.evolvability.coverage import rarefied_coverage
 from nichechain.evolvability.question import DRAWS, Convention, Method, Question, Root
+from nichechain.evolvability.record import draw_children, own_strength, recorded_children
 from nichechain.evolvability.results import Evolvability
 
 if TYPE_CHECKING:
@@ -32,7 +33,8 @@ def genotype_evolvability(
     *,
     l: int = 5,
     lineages: int = 100,
-    offspring: int = 30,
+    offspring: int = 0,
+    record: bool = True,
     first_generation: FirstGeneration = "posterior",
     strength: float | None = None,
     chain: NicheChain | None = None,
@@ -43,7 +45,7 @@ def genotype_evolvability(
     seed: int = 0,
     executor: Executor | None = None,
 ) -> Evolvability:
-    """l-evolvability of a genotype: its own offspring, evaluated now, say where lineages begin.
+    """l-evolvability of a genotype: its own children say where lineages begin.
 
     Parameters
     ----------
@@ -54,13 +56,17 @@ def genotype_evolvability(
     l, lineages, method, convention, repeats, draws, seed
         As in :func:`l_evolvability`.
     offspring : int
-        Number m of offspring to evaluate, at least 1.
+        Number m of offspring to evaluate now, besides those that are recorded; by default none.
+    record : bool
+        Whether the children that the archive has recorded of the elite count. The paper's letter
+        is ``record=False`` with ``offspring=30``.
     first_generation : {"posterior", "empirical"}
-        ``posterior``: D ~ Dirichlet(counts + s·(row of T of the genotype's niche)), for the
-        niches that none of m offspring happened to hit; at l = 1 and U ≤ m, rarefaction of the
-        observed counts instead. ``empirical``: D is the observed share, the paper's letter.
+        ``posterior``: D is drawn given the children and the row of T of the genotype's niche,
+        which speaks for the niches that none of few children happened to hit; without any children,
+        D is that row. For l = 1 and U ≤ m, and where only fresh offspring count, rarefaction of them
+        instead. ``empirical``: D is the observed share, the paper's letter.
     strength : float, optional
-        s, how many offspring the row of T is worth in D; by default as many as make children of one
+        α, how many children the row of T is worth in D; by default as many as make children of one
         elite foretell each other best, see :func:`nichechain.chain.elites.elite_concentration`, or
         1 where T has no posterior.
     chain : NicheChain, optional
@@ -71,26 +77,39 @@ def genotype_evolvability(
     Returns
     -------
     Evolvability
-        ``births`` are those behind the row of the genotype's niche.
+        ``births`` are those behind the row of the genotype's niche, ``recorded`` and ``offspring``
+        the children that count.
 
     Raises
     ------
     NichechainError
-        If an argument is out of range or every offspring failed.
+        If an argument is out of range, every offspring failed, or there are no children to take the
+        share of.
 
     Notes
     -----
-    Source: the paper's procedure, steps 2 to 7.
+    Source: the paper's procedure, steps 2 to 7, and :func:`nichechain.evolvability.record.draw_children`.
+    Recorded children are also among the births behind the row.
     """
     question = Question(l, lineages, convention, method, repeats, draws, seed)
-    check_at_least(1, offspring=offspring)
+    check_at_least(0, offspring=offspring)
     check_choice("first_generation", first_generation, get_args(FirstGeneration))
     if strength is not None:
         check_positive(strength=strength)
+    if not record and not offspring:
+        raise NichechainError("offspring is 0, but must be at least 1 where the record does not count")
     chain = archive.chain() if chain is None else chain
-    counts = _offspring_counts(archive, elite, offspring, seed, executor)
+    counts = np.zeros(archive.niches.states, np.int64)
+    if record:
+        counts += recorded_children(archive, np.array([elite.uid])).toarray()[0]
+    recorded = int(counts.sum())
+    if offspring:
+        counts += _offspring_counts(archive, elite, offspring, seed, executor)
     observed = int(counts.sum())
-    if first_generation == "empirical" and lineages > observed:
+    guessed = first_generation == "posterior"
+    if not guessed and not observed:
+        raise NichechainError("the elite has no recorded children to take the share of: ask for offspring")
+    if not guessed and lineages > observed:
         warnings.warn(
             f"{lineages} lineages begin at the niches of {observed} offspring, "
             "and miss those that none of them happened to hit",
@@ -98,40 +117,25 @@ def genotype_evolvability(
         )
 
     root = Root(chain, niche=elite.state)
-    guessed = first_generation == "posterior"
+    strength = own_strength(chain) if strength is None else strength
 
     def samples() -> Iterator[Sample]:
         # Where T is given, D is not, if it has to be guessed.
         for number, matrix in enumerate(question.transitions(chain, redraw=guessed)):
             if guessed:
                 rng = keyed(seed, Purpose.FIRST_GENERATION, number)
-                yield matrix, draw_children(chain, counts, root.children(matrix), rng, strength)
+                yield matrix, draw_children(counts, root.children(matrix), rng, strength)
             else:
                 yield matrix, counts / observed
 
     result = one_root(chain, samples(), question, question.repeats_of_each(chain, redraw=guessed))
-    result = replace(result, births=root.births, offspring=observed)
-    if guessed and question.steps == 1 and lineages <= observed:
+    result = replace(result, births=root.births, recorded=recorded, offspring=observed - recorded)
+    if guessed and question.steps == 1 and not recorded and lineages <= observed:
         # No distribution has to be guessed: these are children, and there are enough of them.
         value = rarefied_coverage(counts, lineages, counted=chain.n_niches)
         low, high = min(result.low, value), max(result.high, value)
         return replace(result, value=value, standard_error=0.0, low=low, high=high, method="rarefaction")
     return result
-
-
-def draw_children(
-    chain: NicheChain,
-    counts: NDArray[np.int64],
-    row: NDArray[np.float64],
-    rng: np.random.Generator,
-    strength: float | None = None,
-) -> NDArray[np.float64]:
-    """D of genotypes, (..., S), drawn given the states of their offspring and their niche's row of T."""
-    if strength is None:
-        strength = 1.0 if chain.posterior is None else chain.posterior.elite_concentration
-    weight: NDArray[np.float64] = rng.standard_gamma(counts + strength * row)
-    weight /= weight.sum(axis=-1, keepdims=True)
-    return weight
 
 
 def _offspring_counts(

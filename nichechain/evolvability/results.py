@@ -39,7 +39,9 @@ class Evolvability:
         Whether the lineages see nearly all that endlessly many would: fewer tell roots apart
         better.
     offspring : int, optional
-        Offspring whose niches gave D, for a genotype.
+        For a genotype: children that were evaluated now and did not fail.
+    recorded : int, optional
+        For a genotype: children that the archive has recorded of it, among those that gave D.
     """
 
     value: float
@@ -54,6 +56,7 @@ class Evolvability:
     births: int | None
     saturated: bool
     offspring: int | None = None
+    recorded: int | None = None
 
     def _repr_html_(self) -> str:
         return facts_table(

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from nichechain.core.checks import as_floats, check_at_least, check_seed, check_share
 from nichechain.core.errors import NichechainError
 from nichechain.core.randomness import Purpose, keyed
+from nichechain.core.ranks import rank_correlation
 from nichechain.landscape.behaviors import (
     expected_global_sensitivity,
     expected_local_sensitivity,
@@ -210,8 +211,6 @@ class Landscape:
         NichechainError
             If there is not one value per niche.
         """
-        from scipy import stats
-
         other = as_floats("values", values)
         if other.shape != (len(self.niches),):
             raise NichechainError(
@@ -230,8 +229,7 @@ class Landscape:
             rho = p_value = np.nan
             pair = column[known], beside[known]
             if known.sum() > 2 and all(np.ptp(side) > 0 for side in pair):
-                result = stats.spearmanr(*pair)
-                rho, p_value = float(result.statistic), float(result.pvalue)
+                rho, p_value = rank_correlation(*pair)
             found.append(Correlation(name, rho, p_value, int(known.sum())))
         return tuple(found)
 

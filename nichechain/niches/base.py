@@ -150,6 +150,10 @@ def check_bounds(bounds: Bounds) -> None:
     for low, high in bounds:
         if not (np.isfinite(low) and np.isfinite(high) and low < high):
             raise NichechainError(f"bounds are {low:g} to {high:g}, but must be finite and increasing")
+        if not np.isfinite(high - low) or low + (high - low) / 2 in (low, high):
+            raise NichechainError(
+                f"bounds are {low:g} to {high:g}, whose span floating-point numbers cannot divide"
+            )
 
 
 def precision_of(behavior: object) -> np.dtype[np.floating[Any]]:

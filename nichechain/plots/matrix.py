@@ -10,7 +10,7 @@ from scipy import sparse
 from nichechain.core.errors import NichechainError
 from nichechain.niches import GridNiches
 from nichechain.plots.cells import cells_along
-from nichechain.plots.style import EMPTY, INK, colorbar
+from nichechain.plots.style import EMPTY, INK, colorbar, plain
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -62,7 +62,7 @@ def plot_transitions(archive: Archive, chain: NicheChain, ax: Axes) -> Axes:
     ax.xaxis.set_ticks(*_ticks(archive, columns), rotation=90, fontsize="x-small")
     ax.yaxis.set_ticks(*_ticks(archive, rows), fontsize="x-small")
     name, unit = archive.meta.facts.behavior_names[0], archive.meta.facts.unit
-    order = f"by {name} of its centre ({unit})"
+    order = plain(f"by {name} of its centre ({unit})")
     ax.set(xlabel=f"niche of the child, {order}", ylabel=f"niche of the parent, {order}")
     # Niches of one column of the grid stand together: their borders show how far children jump.
     for axis, states in ((ax.axhline, rows), (ax.axvline, columns)):

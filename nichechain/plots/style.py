@@ -52,7 +52,7 @@ def behavior_axes(ax: Axes, archive: Archive, *, strip: bool = True) -> None:
         If behavior has more axes, or one where that makes no sense.
     """
     facts = archive.meta.facts
-    names = [f"{name} ({facts.unit})" for name in facts.behavior_names]
+    names = [plain(f"{name} ({facts.unit})") for name in facts.behavior_names]
     if len(names) > 2 or (len(names) == 1 and not strip):
         raise NichechainError(
             f"behavior has {len(names)} axes, but this is drawn over {'1 or 2' if strip else '2'}: "
@@ -82,6 +82,11 @@ def behavior_axes(ax: Axes, archive: Archive, *, strip: bool = True) -> None:
         )
 
 
+def plain(text: str) -> str:
+    """A name whose dollars are dollars: between two of them matplotlib would read a formula."""
+    return text.replace("$", r"\$")
+
+
 def on_map(behavior: ArrayLike) -> tuple[Floats, Floats]:
     """Where behaviors (..., B) lie on a map; in the middle of a strip if they have one axis."""
     places = np.moveaxis(np.asarray(behavior, np.float64), -1, 0)
@@ -93,7 +98,7 @@ def colorbar(ax: Axes, mappable: ScalarMappable, label: str) -> None:
     figure = ax.get_figure()
     assert figure is not None
     bar = figure.colorbar(mappable, cax=ax.inset_axes((1.03, 0.0, 0.045, 1.0)))
-    bar.set_label(label)
+    bar.set_label(plain(label))
     bar.outline.set_visible(False)
 
 

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from nichechain.validation.direct import DirectCheck
+    from nichechain.validation.drift import LevelCourse
     from nichechain.validation.grid_size import Sweep
     from nichechain.validation.stability import RankStability
 
@@ -175,6 +176,55 @@ def plot_stability(stability: RankStability, ax: Axes) -> Axes:
         ylabel=f"Spearman, {stability.niches} niches by {stability.l}-evolvability",
         title="Is the ranking of niches settled?",
     )
+    ax.tick_params(length=3, color=INK)
+    ax.spines[["top", "right"]].set_visible(False)
+    ax.legend(loc="lower right", frameon=False, fontsize="small")
+    return ax
+
+
+def plot_level(course: LevelCourse, ax: Axes) -> Axes:
+    """Mean l-evolvability by each part of the births alone, and by all up to its end, with 90 % intervals.
+
+    Parameters
+    ----------
+    course : LevelCourse
+    ax : matplotlib.axes.Axes
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+    """
+    for x, level, low, high, color, marker, label in (
+        (
+            course.grown - course.births / 2,
+            course.level,
+            course.low,
+            course.high,
+            LONG_JUMP,
+            "D",
+            "births of a part of the steps alone",
+        ),
+        (
+            course.grown,
+            course.grown_level,
+            course.grown_low,
+            course.grown_high,
+            EDGE,
+            "o",
+            "all births so far",
+        ),
+    ):
+        around = [level - low, high - level]
+        ax.errorbar(
+            x, level, yerr=around, color=color, marker=marker, markersize=4, elinewidth=0.8, label=label
+        )
+    ax.set(
+        xlim=(0.0, 1.03 * float(course.grown[-1])),
+        xlabel="births, in the order of steps",
+        ylabel=f"mean {course.l}-evolvability of {course.niches} niches",
+        title="Is the level settled?",
+    )
+    ax.set_ylim(bottom=0.0)
     ax.tick_params(length=3, color=INK)
     ax.spines[["top", "right"]].set_visible(False)
     ax.legend(loc="lower right", frameon=False, fontsize="small")

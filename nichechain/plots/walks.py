@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from nichechain.core.checks import check_choice
 from nichechain.core.errors import NichechainError
 from nichechain.core.intervals import mean_interval
-from nichechain.plots.style import FAINT, INK
+from nichechain.plots.style import FAINT, INK, plain
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -301,7 +301,7 @@ def _spread(values: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _axis(measure: str, unit: str) -> str:
-    return f"{DRAWN[measure]} ({unit})" if unit and measure != "coverage" else DRAWN[measure]
+    return f"{DRAWN[measure]} ({plain(unit)})" if unit and measure != "coverage" else DRAWN[measure]
 
 
 def _finish(ax: Axes) -> None:

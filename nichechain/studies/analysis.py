@@ -160,7 +160,7 @@ def analyse(
     NichechainError
         If a condition of the records is not the study's, or no run is finished.
     """
-    frame = records.to_pandas()
+    frame = records.to_pandas(use_threads=False)
     tables = _Tables(study, frame)
     last = int(frame["step"].max())
     landmarks = {paper.FIGURE_STEP, paper.METRICS_STEP} if study.kind != "sensitivity" else set()

@@ -138,7 +138,7 @@ def _figure(analysis: Analysis, records: pa.Table, unit: str) -> Figure:
 
     study = analysis.study
     return draw_study(
-        records.to_pandas(),
+        records.to_pandas(use_threads=False),
         step=analysis.last,
         conditions=[label for label, n in analysis.finished.items() if n],
         ordered=study.kind == "pressure" or varied(study) is not None,

@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 from nichechain.core.errors import ArchiveError, NichechainError
 from nichechain.core.files import write_atomically, writing
 from nichechain.core.machine import library_versions
+from nichechain.core.parquet import read_parquet
 from nichechain.core.randomness import Purpose, keyed
 from nichechain.domains.base import Domain
 from nichechain.execution import Executor
@@ -362,7 +363,7 @@ def _read_running(folder: Path, block: Block) -> _Walked | None:
             {name.removeprefix(_PREFIX): v for name, v in arrays.items() if name.startswith(_PREFIX)}
         )
         records, births = (
-            (pq.read_table(io.BytesIO(arrays[name].tobytes())),) if len(arrays[name]) else ()
+            (read_parquet(pa.BufferReader(arrays[name].tobytes())),) if len(arrays[name]) else ()
             for name in ("records", "births")
         )
     except (KeyError, ValueError, OSError, pa.ArrowException) as error:
@@ -397,7 +398,7 @@ def _read_blocks(folder: Path, name: str, study: Study | None) -> pa.Table:
     for block in finished_blocks(folder, study):
         path = folder / name / f"{block.name}.parquet"
         try:
-            rows = pq.read_table(path, page_checksum_verification=True)
+            rows = read_parquet(path, checksums=True)
         except (OSError, pa.ArrowException) as error:
             raise ArchiveError(f"{path} is damaged: {error}") from error
         label = pa.array([block.condition.label] * rows.num_rows, pa.string())
@@ -406,7 +407,7 @@ def _read_blocks(folder: Path, name: str, study: Study | None) -> pa.Table:
         raise ArchiveError(f"{folder} has no finished walks yet: go on with them first")
     order = [(key, "ascending") for key in ("run", "step", "uid")]
     rows = pa.concat_tables(tables)
+    rows = rows.take(pc.sort_indices(rows, order))
     return pa.concat_tables(
-        rows.filter(pc.equal(rows["condition"], condition.label)).sort_by(order)
-        for condition in study.conditions
+        rows.filter(pc.equal(rows["condition"], condition.label)) for condition in study.conditions
     )

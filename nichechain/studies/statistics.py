@@ -14,6 +14,8 @@ from nichechain.core.checks import as_floats, check_at_least
 from nichechain.core.errors import NichechainError
 from nichechain.core.intervals import LEVEL
 from nichechain.core.randomness import Purpose, keyed
+from nichechain.core.ranks import EXACT_BELOW, rank_correlation
+from nichechain.studies.permutations import PERMUTATIONS, permutation_p
 from nichechain.studies.results import Effect, GroupTest, HypothesisTest, Interval, Pair
 
 Floats = NDArray[np.float64]
@@ -59,7 +61,7 @@ def pressure_test(
             raise NichechainError(
                 f"{name} are all {numbers[0]:g}, but a rank correlation needs two that differ"
             )
-    found = stats.spearmanr(level, value)
+    rho, p = rank_correlation(level, value)
     levels, place = np.unique(level, return_inverse=True)
     groups = [value[place == k] for k in range(len(levels))]
 
@@ -72,15 +74,17 @@ def pressure_test(
     return HypothesisTest(
         name="Spearman's rank correlation",
         symbol="r",
-        statistic=float(found.statistic),
-        p=float(found.pvalue),
+        statistic=rho,
+        p=p,
         n=value.size,
-        effect=Effect("Spearman's r", float(found.statistic), interval),
+        effect=Effect("Spearman's r", rho, interval),
     )
 
 
 def metric_test(groups: Mapping[str, ArrayLike], *, seed: int = 0, resamples: int = RESAMPLES) -> GroupTest:
     """Kruskal-Wallis test between independent groups, then Conover's of each pair with Holm's adjustment.
+
+    Of fewer than 10 runs in all p is that of permutations, and pairs have Mann-Whitney tests instead.
 
     Parameters
     ----------
@@ -109,8 +113,15 @@ def metric_test(groups: Mapping[str, ArrayLike], *, seed: int = 0, resamples: in
     names, arrays = list(values), list(values.values())
     n = sum(map(len, arrays))
     found = stats.kruskal(*arrays)
-    # Numbers, not names, as scikit-posthocs sorts them.
-    p = scikit_posthocs.posthoc_conover(arrays, p_adjust="holm").to_numpy()
+    if n < EXACT_BELOW:
+        overall = permutation_p(arrays, stats.kruskal, "independent", seed)
+        name = "Mann-Whitney test"
+        every = stats.PermutationMethod(n_resamples=PERMUTATIONS, rng=keyed(seed, Purpose.PERMUTATION, 1))
+        p = _of_pairs(arrays, lambda a, b: stats.mannwhitneyu(a, b, method=every))
+    else:
+        overall, name = float(found.pvalue), "Conover's test"
+        # Numbers, not names, as scikit-posthocs sorts them.
+        p = scikit_posthocs.posthoc_conover(arrays, p_adjust="holm").to_numpy()
     ranks = np.split(stats.rankdata(np.concatenate(arrays)), np.cumsum([len(a) for a in arrays])[:-1])
 
     def epsilon_squared(*resampled: Floats, axis: int) -> Any:
@@ -129,8 +140,8 @@ def metric_test(groups: Mapping[str, ArrayLike], *, seed: int = 0, resamples: in
     interval = _interval(arrays, epsilon_squared, "within groups", seed, resamples)
     effect = Effect("ε²", float(found.statistic) / (n - 1), interval)
     return GroupTest(
-        HypothesisTest("Kruskal-Wallis test", "H", float(found.statistic), float(found.pvalue), n, effect),
-        "Conover's test, p adjusted by Holm's method",
+        HypothesisTest("Kruskal-Wallis test", "H", float(found.statistic), overall, n, effect),
+        f"{name}, p adjusted by Holm's method",
         {name: float(rank.mean()) for name, rank in zip(names, ranks, strict=True)},
         tuple(pair(i, j) for i, j in combinations(range(len(names)), 2)),
     )
@@ -139,7 +150,8 @@ def metric_test(groups: Mapping[str, ArrayLike], *, seed: int = 0, resamples: in
 def paired_test(groups: Mapping[str, ArrayLike], *, seed: int = 0, resamples: int = RESAMPLES) -> GroupTest:
     """Friedman's test between groups whose runs share their starts, then Conover's test of each pair.
 
-    Between two groups it is Wilcoxon's signed-rank test of the differences.
+    Between two groups it is Wilcoxon's signed-rank test of the differences. Of fewer than 10 runs p is
+    that of permutations within runs, and pairs have Wilcoxon's test as well.
 
     Parameters
     ----------
@@ -200,13 +212,19 @@ def paired_test(groups: Mapping[str, ArrayLike], *, seed: int = 0, resamples: in
     found = stats.friedmanchisquare(*arrays)
     interval = _interval(arrays, kendall, "of runs", seed, resamples, paired=True)
     effect = Effect("Kendall's W", float(found.statistic) / (n * (k - 1)), interval)
-    with warnings.catch_warnings():
-        # Where all runs agree on the order, the test's denominator is 0 and p is 0.
-        warnings.simplefilter("ignore", RuntimeWarning)
-        p = scikit_posthocs.posthoc_conover_friedman(table, p_adjust="holm").to_numpy()
+    if n < EXACT_BELOW:
+        overall = permutation_p(arrays, stats.friedmanchisquare, "samples", seed)
+        name = "Wilcoxon's signed-rank test"
+        p = _of_pairs(arrays, stats.wilcoxon)
+    else:
+        overall, name = float(found.pvalue), "Conover's test after Friedman's"
+        with warnings.catch_warnings():
+            # Where all runs agree on the order, the test's denominator is 0 and p is 0.
+            warnings.simplefilter("ignore", RuntimeWarning)
+            p = scikit_posthocs.posthoc_conover_friedman(table, p_adjust="holm").to_numpy()
     return GroupTest(
-        HypothesisTest("Friedman's test", "χ²", float(found.statistic), float(found.pvalue), n, effect),
-        "Conover's test after Friedman's, p adjusted by Holm's method",
+        HypothesisTest("Friedman's test", "χ²", float(found.statistic), overall, n, effect),
+        f"{name}, p adjusted by Holm's method",
         mean_ranks,
         tuple(pair(i, j, p[i, j]) for i, j in combinations(range(k), 2)),
     )
@@ -289,6 +307,20 @@ def signed_rank_test(
             name, float(np.median(number)), _interval([number], np.median, "of runs", seed, resamples)
         ),
     )
+
+
+def _of_pairs(arrays: Sequence[Floats], test: Callable[[Floats, Floats], Any]) -> Floats:
+    """Of each pair of groups, p adjusted by Holm's method; 1 of groups that are alike."""
+    pairs = list(combinations(range(len(arrays)), 2))
+    alike = [np.array_equal(arrays[i], arrays[j]) for i, j in pairs]
+    found = [
+        1.0 if same else float(test(arrays[i], arrays[j]).pvalue)
+        for (i, j), same in zip(pairs, alike, strict=True)
+    ]
+    p = np.ones((len(arrays), len(arrays)))
+    for (i, j), adjusted in zip(pairs, adjust(found), strict=True):
+        p[i, j] = p[j, i] = adjusted
+    return p
 
 
 def adjust(p: Sequence[float]) -> list[float]:

@@ -3,6 +3,7 @@
 from nichechain.validation.chapman_kolmogorov import births_test, lineages_test
 from nichechain.validation.contrast import Contrast, ContrastRow, contrast
 from nichechain.validation.direct import DirectCheck, Prediction, compare
+from nichechain.validation.drift import LevelCourse, LevelDrift, level_course, level_drift
 from nichechain.validation.grid_size import GridSize, Sweep, sweep
 from nichechain.validation.held_out import Comparison, compare_estimators
 from nichechain.validation.lineages import Triples
@@ -18,6 +19,8 @@ __all__ = [
     "ContrastRow",
     "DirectCheck",
     "GridSize",
+    "LevelCourse",
+    "LevelDrift",
     "Lineages",
     "MarkovTest",
     "Prediction",
@@ -31,6 +34,8 @@ __all__ = [
     "compare_estimators",
     "contrast",
     "homogeneity_test",
+    "level_course",
+    "level_drift",
     "lineage_test",
     "lineages_test",
     "rank_stability",

@@ -25,6 +25,7 @@ from nichechain.niches import Niches
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
+_COLUMNS = ("run", "parent_uid", "parent_niche", "child_niche")
 _LEVEL = 0.9
 # Draws of T for the values themselves, which cost nothing beside the resamples.
 _VALUE_DRAWS = 50
@@ -72,6 +73,12 @@ class Contrast:
         Of each archive what was resampled, ``runs`` or ``elites``, and how many there are.
     births : int
         Births at which coverage is compared.
+    used, recorded : (int, int)
+        Births of each archive that were compared, and those that it has.
+    aligned : int, optional
+        Births of each run that were compared; None where all were.
+    shared : int
+        Births that both archives begin with: one search, where they are many.
     l, lineages, min_births, resamples : int
     """
 
@@ -79,6 +86,10 @@ class Contrast:
     niches: int
     clusters: tuple[tuple[str, int], tuple[str, int]]
     births: int
+    used: tuple[int, int]
+    recorded: tuple[int, int]
+    aligned: int | None
+    shared: int
     l: int
     lineages: int
     min_births: int
@@ -94,6 +105,7 @@ def contrast(
     second: pa.Table,
     niches: Niches,
     *,
+    align: bool = True,
     l: int = 5,
     lineages: int = 100,
     min_births: int = 20,
@@ -109,6 +121,9 @@ def contrast(
         Columns of :mod:`nichechain.births.table`.
     niches : Niches
         The niches of both.
+    align : bool
+        Whether only the first births of each run count, in the order of steps, as many as the shortest
+        run of both archives has: the level of l-evolvability may drift while a search goes on.
     l, lineages : int
         Generations and number U of lineages.
     min_births : int
@@ -142,6 +157,15 @@ def contrast(
     question = Question(l, lineages, draws=draws, seed=seed)
     check_at_least(2, resamples=resamples)
     check_at_least(0, min_births=min_births)
+    recorded = len(first), len(second)
+    first, second = _in_order(first), _in_order(second)
+    shared = _shared(first, second)
+    aligned = None
+    if align:
+        aligned = int(
+            np.concatenate([_runs(births) for births in (first, second)]).min(initial=max(recorded))
+        )
+        first, second = (_beginnings(births, aligned) for births in (first, second))
     sides = _Side.of(first, niches), _Side.of(second, niches)
     whole = [side.counts() for side in sides]
     enough = [counts.births[: len(niches)] >= max(1, min_births) for counts in whole]
@@ -191,7 +215,53 @@ def contrast(
         )
     )
     clusters = (sides[0].kind, sides[0].clusters), (sides[1].kind, sides[1].clusters)
-    return Contrast(rows, compared.size, clusters, size, l, lineages, min_births, resamples)
+    used = len(first), len(second)
+    return Contrast(
+        rows,
+        compared.size,
+        clusters,
+        size,
+        used,
+        recorded,
+        aligned,
+        shared,
+        l,
+        lineages,
+        min_births,
+        resamples,
+    )
+
+
+def _in_order(births: pa.Table) -> pa.Table:
+    """Births run by run, in the order of their steps, or as they come where they do not say them."""
+    check_columns(births, *_COLUMNS)
+    run = births["run"].to_numpy()
+    known = "step" in births.column_names and not births["step"].null_count
+    step = births["step"].to_numpy() if known else np.zeros(run.size)
+    return births.take(pa.array(np.lexsort((step, run))))
+
+
+def _runs(births: pa.Table) -> Ints:
+    """Births of each run."""
+    return np.unique(births["run"].to_numpy(), return_counts=True)[1].astype(np.int64)
+
+
+def _beginnings(births: pa.Table, number: int) -> pa.Table:
+    """The first so many births of each run."""
+    sizes = _runs(births)
+    within = np.arange(len(births)) - np.repeat(np.cumsum(sizes) - sizes, sizes)
+    return births.filter(pa.array(within < number))
+
+
+def _shared(first: pa.Table, second: pa.Table) -> int:
+    """Births that both begin with: the same parents, niches and behavior."""
+    size = min(len(first), len(second))
+    same = np.ones(size, bool)
+    for name in first.column_names:
+        if name in second.column_names and (name in _COLUMNS[1:] or name.startswith("behavior_")):
+            one, other = (table[name].slice(0, size).fill_null(NONE).to_numpy() for table in (first, second))
+            same &= one == other
+    return size if same.all() else int(np.argmin(same))
 
 
 @dataclass(frozen=True)
@@ -218,7 +288,6 @@ class _Side:
 
     @classmethod
     def of(cls, births: pa.Table, niches: Niches) -> _Side:
-        check_columns(births, "run", "parent_uid", "parent_niche", "child_niche")
         parent, child, uid, run = (
             births[name].fill_null(NONE).to_numpy().astype(np.int64)
             for name in ("parent_niche", "child_niche", "parent_uid", "run")

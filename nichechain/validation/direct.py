@@ -20,8 +20,8 @@ from nichechain.chain.model import NicheChain
 from nichechain.core.randomness import Purpose, keyed
 from nichechain.core.row_sampler import RowSampler
 from nichechain.evolvability.coverage import expected_coverage, rarefied_coverage
-from nichechain.evolvability.genotypes import draw_children
 from nichechain.evolvability.question import Question
+from nichechain.evolvability.record import draw_children, own_strength
 from nichechain.niches import Niches
 from nichechain.validation.rollouts import Lineages, niches_reached
 from nichechain.validation.simulate import simulate_lineages
@@ -153,7 +153,8 @@ def compare(
     """Predict what the lineages reached, without looking at them.
 
     Values are those of :func:`nichechain.l_evolvability` and
-    :func:`nichechain.genotype_evolvability` for each root and each number of generations.
+    :func:`nichechain.genotype_evolvability` for each root and each number of generations, of its fresh
+    offspring alone.
 
     Parameters
     ----------
@@ -177,12 +178,13 @@ def compare(
     roots, size, generations = lineages.states.shape
     n = chain.n_niches
     counts = np.stack([np.bincount(row[row != NONE], minlength=chain.states) for row in lineages.offspring])
+    strength = own_strength(chain)
     values: list[Floats] = []
     simulated: list[Ints] = []
     for number, matrix in enumerate(question.transitions(chain, redraw=True)):
         rows = matrix[lineages.roots] if isinstance(matrix, np.ndarray) else matrix[lineages.roots].toarray()
         rng = keyed(seed, Purpose.FIRST_GENERATION, number)
-        first = np.concatenate([rows, draw_children(chain, counts, rows, rng)])
+        first = np.concatenate([rows, draw_children(counts, rows, rng, strength)])
         values.append(
             np.stack(
                 [expected_coverage(matrix, first, k + 1, size, counted=n) for k in range(generations)], axis=1

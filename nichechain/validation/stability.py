@@ -43,8 +43,12 @@ class RankStability:
         Births that the parts have on average.
     spearman : (F, R) float64 array
         Rank correlation of niche l-evolvability with that from all births, per repeat.
+    level : (F, R) float64 array
+        Mean l-evolvability over the niches compared, in niches, by each part.
+    all_level : float
+        The same by all births.
     halves : (R,) float64 array
-        The same between two halves that share no birth.
+        Rank correlation between two halves that share no birth.
     niches : int
         Niches compared: those with at least ``min_births`` births behind their row of all.
     all_births : int
@@ -58,6 +62,8 @@ class RankStability:
     fractions: Floats
     births: Floats
     spearman: Floats
+    level: Floats
+    all_level: float
     halves: Floats
     niches: int
     all_births: int
@@ -100,7 +106,7 @@ class RankStability:
         return f"{enough} {repeated}"
 
     def to_frame(self) -> pd.DataFrame:
-        """One row per part: fraction, births, mean, smallest and largest correlation."""
+        """One row per part: fraction, births, mean, smallest and largest correlation, mean level."""
         return pd.DataFrame(
             {
                 "fraction": self.fractions,
@@ -108,6 +114,7 @@ class RankStability:
                 "spearman": self.spearman.mean(axis=1),
                 "lowest": self.spearman.min(axis=1),
                 "highest": self.spearman.max(axis=1),
+                "level": self.level.mean(axis=1),
             }
         )
 
@@ -181,7 +188,7 @@ def rank_stability(
 
     full = scores(counts, 0)
     spearman, births = np.empty((parts.size, repeats)), np.empty((parts.size, repeats))
-    halves = np.empty(repeats)
+    level, halves = np.empty_like(spearman), np.empty(repeats)
     number = 0
     for repeat in range(repeats):
         rank = _Thinner(counts, thin, keyed(seed, Purpose.THINNING, repeat))
@@ -192,11 +199,15 @@ def rank_stability(
             thinned = rank.part(0.0, part)
             number += 1
             births[k, repeat] = thinned.births.sum()
-            spearman[k, repeat] = _agreement(full, scores(thinned, number))
+            found = scores(thinned, number)
+            spearman[k, repeat] = _agreement(full, found)
+            level[k, repeat] = found.mean()
     return RankStability(
         parts,
         births.mean(axis=1),
         spearman,
+        level,
+        float(full.mean()),
         halves,
         ranked.size,
         int(counts.births.sum()),

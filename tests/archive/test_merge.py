@@ -4,9 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pandas as pd
+import pyarrow as pa
 import pytest
 
 import nichechain as nc
+from nichechain.archive import read
 from nichechain.archive.merge import merge
 from nichechain.core.errors import ArchiveError, NichechainError
 
@@ -129,6 +131,32 @@ def test_archives_that_do_not_belong_together(runs, tmp_path, changes, said):
     other = built(tmp_path / "other", **({"seed": 7} if "evaluations" not in changes else {}), **changes)
     with pytest.raises(NichechainError, match=said):
         merge([runs[0], other], tmp_path / "all")
+    assert not (tmp_path / "all").exists()
+
+
+@pytest.mark.parametrize(
+    ("name", "row", "value", "said"),
+    [
+        ("uid", 60, 59, "does not number its births from 0, each once"),
+        ("parent_uid", 60, 60, "parents are no earlier births"),
+        ("parent_uid", 60, 299, "parents are no earlier births"),
+        ("parent_uid", 60, -7, "parents are no earlier births"),
+        ("parent_uid", 60, 10**12, "parents are no earlier births"),
+    ],
+)
+def test_a_record_that_no_search_leaves_is_refused(runs, tmp_path, monkeypatch, name, row, value, said):
+    read_births = read.read_births
+
+    def forged(folder, meta):
+        births = read_births(folder, meta)
+        column = births[name].to_pylist()
+        column[row] = value
+        place = births.column_names.index(name)
+        return births.set_column(place, births.schema.field(name), pa.array(column, pa.int64()))
+
+    monkeypatch.setattr(read, "read_births", forged)
+    with pytest.raises(ArchiveError, match=said):
+        merge(runs[:2], tmp_path / "all")
     assert not (tmp_path / "all").exists()
 
 

@@ -13,11 +13,11 @@ def test_what_a_notebook_shows_of_the_shipped_archive():
     archive = nc.load("fetch-pick-and-place")
     shown = archive._repr_html_()
     assert f"{archive.filled} of 400" in shown
-    assert "40000, " in shown
+    assert "42000, " in shown
     chain = archive.chain()
     shown = chain._repr_html_()
     # All births but the 100 initial ones have a parent.
-    assert f"<td style='text-align:left'>{40000 - 100}</td>" in shown
+    assert f"<td style='text-align:left'>{42000 - 100}</td>" in shown
     assert chain.estimator in shown
 
 

@@ -14,8 +14,10 @@ from gymnasium import spaces
 
 import nichechain as nc
 from nichechain import execution
+from nichechain.cli import main
 from nichechain.core.errors import NichechainError
 from nichechain.domains import Domain, Evaluation, GymDomain, Noise, Noisy, Perturbable, make
+from nichechain.domains.constancy import inconstancy
 from nichechain.domains.policies.spaces import BoxActions, DiscreteActions, Observations, actions_of
 
 SQUARE = ((-2.0, 2.0), (-2.0, 2.0))
@@ -339,10 +341,11 @@ def test_options_of_the_environment():
 @pytest.mark.parametrize(
     "space",
     [
-        spaces.MultiDiscrete([2, 3]),
         spaces.Box(-np.inf, np.inf, (2,)),
         spaces.Box(0, 9, (2,), np.int64),
-        spaces.Tuple([spaces.Discrete(2)]),
+        spaces.Text(3),
+        spaces.Tuple([]),
+        spaces.Tuple([spaces.Discrete(2), spaces.Text(3)]),
     ],
 )
 def test_actions_that_are_not_supported(space):
@@ -351,10 +354,10 @@ def test_actions_that_are_not_supported(space):
 
 
 @pytest.mark.parametrize(
-    "space", [spaces.Text(3), spaces.Dict(a=spaces.Tuple([spaces.Discrete(2)])), spaces.MultiDiscrete([2, 2])]
+    "space", [spaces.Text(3), spaces.Dict(a=spaces.Tuple([spaces.Text(3)])), spaces.Tuple([])]
 )
 def test_observations_that_are_not_supported(space):
-    with pytest.raises(NichechainError, match="but must be Box, Discrete or MultiBinary"):
+    with pytest.raises(NichechainError, match="but must be Box, Discrete, MultiDiscrete or MultiBinary"):
         Observations.of(space)
 
 
@@ -372,6 +375,96 @@ def test_observations_are_read_in_the_order_of_their_keys():
     everything = Observations.of(space)
     np.testing.assert_array_equal(everything.flat(value), spaces.flatten(space, value))
     assert everything.high.tolist() == [255, 255, 255, 255, 1, 1, 1, 1, 1]
+
+
+NESTED = spaces.Dict(
+    {
+        "observation": spaces.Tuple(
+            [
+                spaces.Box(-2, 2, (2,), np.float32),
+                spaces.Dict({"gear": spaces.Discrete(3), "dials": spaces.MultiDiscrete([2, 3])}),
+                spaces.MultiBinary(2),
+            ]
+        ),
+        "goal": spaces.Tuple([spaces.Discrete(2, start=5), spaces.MultiDiscrete([[2, 2], [3, 2]])]),
+    }
+)
+
+
+@pytest.mark.parametrize("key", ["observation", "goal"])
+def test_nested_observations_are_flattened_as_gymnasium_does(key):
+    space = NESTED[key]
+    space.seed(1)
+    read = Observations.of(NESTED, [key])
+    assert read.inputs == spaces.flatdim(space) == len(read.low) == len(read.high)
+    for _ in range(20):
+        value = space.sample()
+        np.testing.assert_array_equal(read.flat({key: value}), spaces.flatten(space, value))
+    assert Observations.of(space).inputs == read.inputs
+
+
+def test_nested_actions_belong_to_their_space():
+    rng = np.random.default_rng(0)
+    for space in (NESTED, NESTED["observation"], NESTED["goal"], spaces.MultiDiscrete([2, 5], start=[1, -2])):
+        actions = actions_of(space)
+        assert actions.outputs == spaces.flatdim(space)
+        for _ in range(20):
+            assert space.contains(actions.action(rng.normal(size=actions.outputs).astype(np.float32)))
+
+
+def test_of_many_choices_each_has_its_largest_output():
+    actions = actions_of(spaces.MultiDiscrete([2, 3], start=[0, 4]))
+    assert actions.action(np.float32([1, 2, 3, 1, 2])).tolist() == [1, 4]
+    assert actions_of(spaces.MultiBinary(3)).action(np.float32([-1, 0, 2])).tolist() == [0, 0, 1]
+    several = actions_of(spaces.Tuple([spaces.Discrete(2), spaces.Box(-1, 1, (1,))]))
+    assert several.activation == "tanh"
+    choice, size = several.action(np.float32([0.1, 0.2, 0.5]))
+    assert (choice, size.tolist()) == (1, [0.5])
+
+
+class Machine(gymnasium.Env):
+    """Two numbers that a gear and a push move; both spaces are nested."""
+
+    observation_space = spaces.Tuple([spaces.Box(-9, 9, (1,)), spaces.Dict(turned=spaces.Box(-9, 9, (1,)))])
+    action_space = spaces.Dict(gear=spaces.MultiDiscrete([3, 2]), push=spaces.Box(-1, 1, (1,)))
+
+    def __init__(self, leak=False):
+        self.leak, self.at = leak, np.zeros(2)
+
+    def reset(self, *, seed=None, options=None):  # noqa: ARG002  # as Gymnasium calls it
+        super().reset(seed=seed)
+        self.at = (0.5 if self.leak else 0.0) * self.at
+        return self._seen(), {}
+
+    def step(self, action):
+        assert self.action_space.contains(action)
+        self.at = self.at + np.array([action["push"][0], action["gear"][0] - 1])
+        return self._seen(), 0.0, False, False, {}
+
+    def _seen(self):
+        return np.float32(self.at[:1]), {"turned": np.float32(self.at[1:])}
+
+
+gymnasium.register("nichechain-test/Machine-v0", Machine, max_episode_steps=4)
+
+
+def machine(**options):
+    return GymDomain(
+        "nichechain-test/Machine-v0", "final-observation:0,1", controller="mlp:4", env_options=options
+    )
+
+
+def test_an_environment_with_nested_spaces_is_a_domain():
+    domain = machine()
+    assert domain.bounds == ((-9.0, 9.0), (-9.0, 9.0))
+    genotypes = policies(domain)
+    found = domain.evaluate(genotypes)
+    assert not found.failed.any()
+    assert found.behavior.dtype == np.float32
+    episode = domain.episode(genotypes[0])
+    assert episode.actions.shape == (4,)
+    pushed = sum(action["push"][0] for action in episode.actions)
+    assert found.behavior[0, 0] == pytest.approx(pushed, abs=1e-6)
 
 
 def test_actions_span_their_bounds():
@@ -469,3 +562,22 @@ def test_no_simulator_is_imported_before_it_is_asked_for():
     )
     shown = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
     assert shown.stdout.strip() == "set()"
+
+
+def test_a_reset_that_leaks_is_noticed():
+    def found(**options):
+        domain = machine(**options)
+        return inconstancy(domain.evaluate, machine(**options).evaluate, policies(domain))
+
+    assert found() is None
+    assert "again in another order has a behavior" in found(leak=True)
+
+
+def test_a_build_says_that_its_environment_leaks(tmp_path, capsys):
+    arguments = ["build", "gym:nichechain-test/Machine-v0", "--descriptor", "final-observation:0,1"]
+    arguments += ["--controller", "mlp:4", "--evaluations", "40", "--initial", "20", "--bounds=-9,9,-9,9"]
+    assert main([*arguments, "--grid", "4x4", "--out", str(tmp_path / "pure")]) == 0
+    assert "something random" not in capsys.readouterr().err
+    leaking = [*arguments, "--grid", "4x4", "--options", "env.leak=true", "--out", str(tmp_path / "leaking")]
+    assert main(leaking) == 0
+    assert "has something random that its seed does not fix: a genotype" in capsys.readouterr().err

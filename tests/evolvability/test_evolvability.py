@@ -378,6 +378,11 @@ def plane_chain():
     return estimate(counts, strength=4.0)
 
 
+def fresh(archive, elite, **options):
+    """The paper's letter: only offspring evaluated now say where lineages begin."""
+    return genotype_evolvability(archive, elite, **({"offspring": 30, "record": False} | options))
+
+
 def _landed(archive, elite, offspring, seed):
     from nichechain.core.randomness import Purpose, keyed
 
@@ -392,19 +397,19 @@ def test_the_children_of_a_genotype_are_rarefied(plane_chain):
     born = int(counts.sum())
     assert counts[9] > 0
     assert born < 30
-    result = genotype_evolvability(archive, elite, l=1, lineages=born, offspring=30, seed=2)
+    result = fresh(archive, elite, l=1, lineages=born, offspring=30, seed=2)
     # As many lineages as offspring: what was observed, outside and failures left out, exactly.
     assert result.value == np.count_nonzero(counts[:9])
     assert (result.method, result.offspring) == ("rarefaction", born)
     assert result.births == plane_chain.births[4]
-    one = genotype_evolvability(archive, elite, l=1, lineages=1, offspring=30, seed=2)
+    one = fresh(archive, elite, l=1, lineages=1, offspring=30, seed=2)
     assert one.value == pytest.approx(counts[:9].sum() / born, rel=1e-12)
 
 
 def test_the_interval_of_a_rarefied_value_holds_it(plane_chain):
     archive, elite = _plane(plane_chain)
     for seed in range(5):
-        result = genotype_evolvability(archive, elite, l=1, lineages=15, offspring=30, seed=seed)
+        result = fresh(archive, elite, l=1, lineages=15, offspring=30, seed=seed)
         assert result.low <= result.value <= result.high
 
 
@@ -415,10 +420,10 @@ def test_empirical_offspring_are_the_observed_shares_and_warn_of_what_they_miss(
     given_t = NicheChain(plane_chain.T, niches=GRID, outside=9)
     options = {"offspring": 12, "first_generation": "empirical", "chain": given_t, "seed": 0}
     with pytest.warns(UserWarning, match=f"100 lineages begin at the niches of {born} offspring"):
-        result = genotype_evolvability(archive, elite, l=2, lineages=100, **options)
+        result = fresh(archive, elite, l=2, lineages=100, **options)
     expected = l_evolvability(given_t, offspring=counts / born, l=2, lineages=100)
     assert result.value == pytest.approx(expected.value, rel=1e-12)
-    few = genotype_evolvability(archive, elite, l=2, lineages=born, **options)
+    few = fresh(archive, elite, l=2, lineages=born, **options)
     assert few.value < result.value
 
 
@@ -440,8 +445,8 @@ def test_a_posterior_of_the_offspring_is_nearer_to_the_truth_than_their_shares()
     exact = 144 * (1 - (1 - 1 / 144) ** 100)
     options = {"l": 1, "lineages": 100, "offspring": 30, "draws": 20, "seed": 1}
     with pytest.warns(UserWarning, match="miss those that none of them happened to hit"):
-        empirical = genotype_evolvability(archive, elite, first_generation="empirical", **options).value
-    posterior = genotype_evolvability(archive, elite, **options).value
+        empirical = fresh(archive, elite, first_generation="empirical", **options).value
+    posterior = fresh(archive, elite, **options).value
     assert empirical <= 30
     assert posterior == pytest.approx(exact, rel=0.2)
 
@@ -455,10 +460,10 @@ def test_by_default_the_row_is_worth_what_siblings_make_likely():
     chain = estimate(TransitionCounts.from_births(elite // 3, child, niches, elite=elite))
     archive, root = _plane(chain)
     options = {"l": 2, "lineages": 20, "offspring": 10, "draws": 10, "chain": chain}
-    found = genotype_evolvability(archive, root, **options)
+    found = fresh(archive, root, **options)
     concentration = chain.posterior.elite_concentration
     assert concentration < 5 < chain.posterior.strength
-    assert found == genotype_evolvability(archive, root, strength=concentration, **options)
+    assert found == fresh(archive, root, strength=concentration, **options)
 
 
 def test_offspring_leave_their_distribution_open_though_t_is_given(plane_chain):
@@ -473,7 +478,7 @@ def test_offspring_leave_their_distribution_open_though_t_is_given(plane_chain):
             "method": method,
             "repeats": 200,
         }
-        result = genotype_evolvability(archive, elite, draws=30, **options)
+        result = fresh(archive, elite, draws=30, **options)
         assert result.low < result.value < result.high
         assert result.standard_error > 0
 
@@ -481,8 +486,8 @@ def test_offspring_leave_their_distribution_open_though_t_is_given(plane_chain):
 def test_a_genotype_by_monte_carlo_agrees_with_exact(plane_chain):
     archive, elite = _plane(plane_chain)
     options = {"l": 3, "lineages": 10, "draws": 50, "seed": 6}
-    exact = genotype_evolvability(archive, elite, **options)
-    sampled = genotype_evolvability(archive, elite, method="monte-carlo", repeats=5000, **options)
+    exact = fresh(archive, elite, **options)
+    sampled = fresh(archive, elite, method="monte-carlo", repeats=5000, **options)
     assert abs(sampled.value - exact.value) <= 4 * 3 / math.sqrt(5000)
 
 
@@ -502,11 +507,11 @@ def test_a_genotype_by_monte_carlo_agrees_with_exact(plane_chain):
 def test_bad_arguments_of_a_genotype(plane_chain, arguments, message):
     archive, elite = _plane(plane_chain)
     with pytest.raises(NichechainError, match=message):
-        genotype_evolvability(archive, elite, **arguments)
+        fresh(archive, elite, **arguments)
 
 
 def test_offspring_that_all_fail_are_said(plane_chain):
     archive, elite = _plane(plane_chain, noise=0.001)
     elite.genotype = np.array([-5.0, 1.0], np.float32)
     with pytest.raises(NichechainError, match="all 30 offspring failed, the first with: below zero"):
-        genotype_evolvability(archive, elite)
+        fresh(archive, elite)

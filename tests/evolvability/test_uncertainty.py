@@ -159,7 +159,7 @@ def test_the_command_says_which_band_it_shows(built, capsys, uncertainty):
     [
         (["--elite", "0,0"], "--uncertainty prior is of niches, but --elite asks for a genotype"),
         (["--estimator", "mle"], "--uncertainty prior belongs to empirical-bayes, not to mle"),
-        (["--method", "monte-carlo"], "--uncertainty prior is computed in closed form, not by monte-carlo"),
+        (["--method", "monte-carlo"], "--uncertainty prior is not computed by monte-carlo"),
     ],
 )
 def test_bands_that_the_command_has_not(built, capsys, options, said):

@@ -225,6 +225,32 @@ CALLS = (
         },
     ),
     Call(
+        "validation.drift.level_drift",
+        lambda w: {"births": w.table, "niches": w.archive.niches, "min_births": 1, "draws": 2},
+        {
+            "births": (
+                Made(lambda w: w.table.slice(0, 0), "no-births"),
+                Made(lambda w: w.table.drop_columns(["step"]), "no-column"),
+            ),
+            "niches": (_OTHER,),
+            "min_births": (*whole(-1)[1:], 10_000),
+            "draws": whole(1),
+            **LINEAGES,
+        },
+    ),
+    Call(
+        "validation.drift.level_course",
+        lambda w: {"births": w.table, "niches": w.archive.niches, "parts": 2, "min_births": 1, "draws": 2},
+        {
+            "births": (Made(lambda w: w.table.slice(0, 0), "no-births"),),
+            "niches": (_OTHER,),
+            "parts": whole(1),
+            "min_births": (*whole(-1)[1:], 10_000),
+            "draws": whole(1),
+            **LINEAGES,
+        },
+    ),
+    Call(
         "validation.stability.rank_stability",
         lambda w: {"counts": w.counts, "fractions": (0.5,), "repeats": 1, "draws": 1},
         {

@@ -167,7 +167,9 @@ TABLE: tuple[tuple[str, str, tuple[str, ...], Bad], ...] = (
             "convention": _UNKNOWN,
             "estimator": _UNKNOWN,
             "unvisited": ("self", *_UNKNOWN),
-            "offspring": _COUNT,
+            # Without --elite it is nobody's.
+            "offspring": ("3", *_NATURAL),
+            "rank": _UNKNOWN,
             "min_births": _NATURAL,
             "draws": _COUNT,
             "uncertainty": _UNKNOWN,
@@ -180,7 +182,7 @@ TABLE: tuple[tuple[str, str, tuple[str, ...], Bad], ...] = (
         "evolvability",
         "EvolvabilityCommand",
         ("{archive}", "--elite", "{niche}"),
-        {"workers": _WORKERS, "cache_memory": _MEMORY},
+        {"workers": _WORKERS, "cache_memory": _MEMORY, "offspring": _NATURAL, "rank": ("elites",)},
     ),
     (
         "explore",
@@ -366,8 +368,10 @@ FREE = {
     "unit": "any text",
     **dict.fromkeys(
         (
+            "all_births",
             "compare",
             "force",
+            "fresh_only",
             "json",
             "lowest",
             "other_niche",

@@ -39,11 +39,16 @@ CALLS = (
         "genotype_evolvability",
         lambda w: {"archive": w.archive, "elite": w.elite, "offspring": 2, "draws": 2},
         {
-            "offspring": whole(0),
+            "offspring": whole(-1),
             "first_generation": UNKNOWN,
             "strength": POSITIVE,
             **_ASKED,
         },
+    ),
+    Call(
+        "elite_evolvability",
+        lambda w: {"archive": w.archive, "draws": 2},
+        {"strength": POSITIVE, "convention": UNKNOWN, "draws": whole(0), **LINEAGES},
     ),
     Call(
         "prior_sensitivity",

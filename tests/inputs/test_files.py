@@ -58,7 +58,7 @@ CALLS = (
     Call(
         "Archive.elite",
         lambda w: {"self": w.archive, "niche": w.elite.niche},
-        {"niche": (-1, 25, (9, 9), "0")},
+        {"niche": (-1, 26, (9, 9), "0")},
     ),
     Call(
         "Archive.counts_of",

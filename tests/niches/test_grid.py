@@ -259,3 +259,9 @@ def test_float64_is_compared_as_it_is():
     assert grid.of(CORNERS).tolist() == [399, 0]
     # In float32, 1.1 is larger than it is, and 1.05 smaller.
     assert grid.of(np.array(CORNERS, np.float32).astype(np.float64)).tolist() == [400, 400]
+
+
+@pytest.mark.parametrize("bounds", [(-1e308, 1e308), (1.0, 1.0 + 2**-52), (0.0, 5e-324)])
+def test_bounds_that_numbers_cannot_divide_are_refused(bounds):
+    with pytest.raises(NichechainError, match="whose span floating-point numbers cannot divide"):
+        GridNiches((2,), (bounds,))

@@ -120,7 +120,22 @@ def test_runs_that_all_agree_have_a_concordance_of_1():
     base = np.random.default_rng(0).normal(size=6)
     found = paired_test({"a": base, "b": base + 1, "c": base + 2}, resamples=FEW)
     assert found.test.effect.value == pytest.approx(1)
-    assert all(pair.p == 0 and pair.effect.value == -1 for pair in found.pairs)
+    assert all(pair.effect.value == -1 for pair in found.pairs)
+    # Of 2**6 signs two are as one-sided, and Holm's method multiplies the smallest of three by 3.
+    assert [pair.p for pair in found.pairs] == pytest.approx([3 * 2 / 64] * 3)
+    # All runs agree in 6 of the 6**6 ways of ordering three groups six times.
+    assert found.test.p < 0.001
+
+
+def test_a_handful_of_runs_is_judged_by_all_permutations():
+    assert pressure_test([0, 1, 2], [5, 6, 9], resamples=FEW).p == pytest.approx(2 / 6)
+    assert pressure_test([0, 1, 2, 3], [9, 6, 5, 1], resamples=FEW).p == pytest.approx(2 / 24)
+    # Three of six are the smallest in 2 of 20 ways.
+    found = metric_test({"a": [1, 2, 3], "b": [4, 5, 6]}, resamples=FEW)
+    assert found.test.p == found.pairs[0].p == pytest.approx(2 / 20)
+    # Three groups in the same order in 2 runs of 2: 6 of 36 ways.
+    found = paired_test({"a": [1, 2], "b": [3, 4], "c": [5, 6]}, resamples=FEW)
+    assert found.test.p == pytest.approx(6 / 36)
 
 
 def test_paired_runs_are_compared_within_themselves():

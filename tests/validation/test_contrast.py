@@ -58,15 +58,44 @@ def test_one_generation_of_one_lineage_is_one_niche():
 
 def test_coverage_is_compared_at_equal_births():
     small, large = births(3, 5, per_run=60), births(3, 6, per_run=900)
-    found = contrast(small, large, GRID, resamples=3, min_births=1, l=1)
+    found = contrast(small, large, GRID, resamples=3, min_births=1, l=1, align=False)
     visits = np.bincount(large["child_niche"].to_numpy(), minlength=16)
     assert found.births == 60
     assert found.rows[2].second == pytest.approx(rarefied_coverage(visits, 60))
     assert found.rows[2].first == np.unique(small["child_niche"].to_numpy()).size
 
 
+def test_archives_are_aligned_by_births():
+    small, large = births(3, 5, per_run=600), births(3, 6, per_run=900)
+    options = {"resamples": 3, "min_births": 1, "l": 2, "lineages": 5}
+    found = contrast(small, large, GRID, **options)
+    assert (found.used, found.recorded, found.aligned) == ((600, 600), (600, 900), 600)
+    assert found.rows == contrast(small, large.slice(0, 600), GRID, **options).rows
+    whole = contrast(small, large, GRID, **options, align=False)
+    assert (whole.used, whole.aligned) == ((600, 900), None)
+    assert whole.rows != found.rows
+
+
+def test_each_run_is_cut_to_the_shortest():
+    several, one = births(3, 7, runs=4, per_run=300), births(3, 8, per_run=900)
+    # Runs may come in any order.
+    mixed = several.take(pa.array(np.random.default_rng(0).permutation(len(several))))
+    found = contrast(mixed, one, GRID, resamples=3, min_births=1, l=1)
+    assert (found.used, found.recorded, found.clusters[0]) == ((1200, 300), (1200, 900), ("runs", 4))
+
+
+def test_a_search_that_is_the_beginning_of_another_is_told():
+    long = births(3, 6, per_run=900)
+    found = contrast(long.slice(0, 500), long, GRID, resamples=3, min_births=1, l=1)
+    assert found.shared == 500
+    other = pa.concat_tables([long.slice(0, 200), births(3, 9, per_run=400)])
+    assert 200 <= contrast(other, long, GRID, resamples=3, min_births=1, l=1).shared < 210
+
+
 def test_runs_are_resampled_where_there_are_several():
-    found = contrast(births(3, 7, runs=4, per_run=500), births(3, 8), GRID, resamples=20, l=1, lineages=10)
+    found = contrast(
+        births(3, 7, runs=4, per_run=500), births(3, 8), GRID, resamples=20, l=1, lineages=10, align=False
+    )
     assert found.clusters == (("runs", 4), ("elites", 160))
     row = found.rows[0]
     # Student's quantile for four runs: 2.353.

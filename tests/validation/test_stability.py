@@ -38,6 +38,11 @@ def test_clear_differences_need_few_births(thin):
     assert f"{found.enough:.0%} of the births" in found.answer
     assert "not enough" not in found.answer
     np.testing.assert_allclose(found.births / found.all_births, found.fractions, atol=0.08)
+    # Niche i has i + 1 ways on, each as likely: (i + 1)(1 − (1 − 1/(i + 1))^20) are seen by 20 children.
+    ways = np.arange(1, 17)
+    expected = (ways * (1 - (1 - 1 / ways) ** 20)).mean()
+    assert found.all_level == pytest.approx(expected, rel=0.05)
+    assert found.level[-1].mean() == pytest.approx(expected, rel=0.05)
 
 
 def test_niches_that_do_not_differ_are_never_ranked_alike():
@@ -71,6 +76,8 @@ def made(spearman, halves):
         fractions,
         1000 * fractions,
         np.array(spearman)[:, None],
+        np.full((3, 1), 7.0),
+        7.0,
         np.array([halves]),
         50,
         1000,

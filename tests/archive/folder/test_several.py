@@ -147,6 +147,28 @@ def test_readers_see_whole_commits_and_are_never_kept_waiting(
     assert first < config.evaluations
 
 
+def test_reading_begins_no_threads(pristine: dict[str, bytes], tmp_path: Path) -> None:
+    """One that still held Python's bytes when the interpreter ended would abort it."""
+    code = (
+        "import os, sys\n"
+        "from nichechain.archive.archive import load\n"
+        "before = len(os.listdir('/proc/self/task'))\n"
+        "archive = load(sys.argv[1])\n"
+        "archive.births(), archive.counts_of()\n"
+        "print(len(os.listdir('/proc/self/task')) - before)"
+    )
+    if not Path("/proc/self/task").is_dir():
+        pytest.skip("threads are counted where /proc tells them")
+    done = subprocess.run(
+        [sys.executable, "-c", code, str(written(tmp_path, pristine))],
+        capture_output=True,
+        cwd=ROOT,
+        text=True,
+        check=True,
+    )
+    assert done.stdout == "0\n"
+
+
 def test_a_folder_that_is_built_anew_is_no_later_commit(pristine: dict[str, bytes], tmp_path: Path) -> None:
     """Births of another build must not pass for those of the one that was opened."""
     folder = written(tmp_path, pristine)

@@ -1,0 +1,129 @@
+"""l-evolvability of every elite of an archive, from the children that it has had already."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+from scipy import sparse
+
+from nichechain.chain.model import NicheChain
+from nichechain.core.checks import check_positive
+from nichechain.core.errors import NichechainError
+from nichechain.core.randomness import Purpose, keyed
+from nichechain.evolvability.averaging import ENDLESS, SATURATED, summary
+from nichechain.evolvability.coverage import LinearOperator, expected_coverage
+from nichechain.evolvability.question import DRAWS, Convention, Question
+from nichechain.evolvability.record import draw_known, own_strength, recorded_children
+
+if TYPE_CHECKING:
+    from nichechain.archive.archive import Archive
+
+Floats = NDArray[np.float64]
+
+
+def elite_evolvability(
+    archive: Archive,
+    *,
+    l: int = 5,
+    lineages: int = 100,
+    strength: float | None = None,
+    chain: NicheChain | None = None,
+    convention: Convention = "definition",
+    draws: int = DRAWS,
+    seed: int = 0,
+) -> pd.DataFrame:
+    """Rank all elites by l-evolvability without a single rollout: their recorded children begin the lineages.
+
+    Parameters
+    ----------
+    archive : Archive
+    l, lineages, convention, draws, seed
+        As in :func:`nichechain.l_evolvability`.
+    strength : float, optional
+        As in :func:`nichechain.genotype_evolvability`.
+    chain : NicheChain, optional
+        By default ``archive.chain()``.
+
+    Returns
+    -------
+    pandas.DataFrame
+        One row per elite, the largest value first: ``niche`` and its label ``index``, ``uid``,
+        ``depth``, ``value``, ``low``, ``high``, ``standard_error``; ``births`` behind the row of its niche
+        (-1 where T is given), and ``recorded``, its own children. An elite without any has the value
+        of its niche. ``saturated`` is as in :class:`nichechain.Evolvability`.
+
+    Raises
+    ------
+    NichechainError
+        If an argument is out of range, or the archive has no elites.
+
+    Notes
+    -----
+    What :func:`nichechain.genotype_evolvability` says of each with ``offspring=0``, in closed form, from
+    the same draws of T but other draws of D. Probabilities of visits are computed once for all elites.
+    """
+    question = Question(l, lineages, convention, draws=draws, seed=seed)
+    if strength is not None:
+        check_positive(strength=strength)
+    n = len(archive.niches)
+    elites = archive.elites[np.flatnonzero(archive.elites.niche < n)]
+    if not len(elites):
+        raise NichechainError("no niche has an elite, so there is none to rank")
+    chain = archive.chain() if chain is None else chain
+    if chain.states != archive.niches.states:
+        raise NichechainError(
+            f"chain has {chain.states} states and the archive {archive.niches.states}: "
+            "estimate it from the archive's births"
+        )
+    strength = own_strength(chain) if strength is None else strength
+    children = recorded_children(archive, elites.uid)
+    means, saturated = [], False
+    for number, matrix in enumerate(question.transitions(chain, redraw=True)):
+        rng = keyed(seed, Purpose.FIRST_GENERATION, number)
+        known, shares = draw_known(children, rng, strength)
+        first = _FirstRows(shares, 1.0 - known, matrix, elites.niche)
+        covered = expected_coverage(matrix, first, question.steps, [lineages, ENDLESS], counted=n)
+        saturated |= bool(np.median(covered[:, 0] / np.maximum(covered[:, 1], 1e-300)) > SATURATED)
+        means.append(covered[:, 0])
+    value, error, low, high = summary(np.array(means), np.zeros((len(means), len(elites))))
+    births = np.full(n, -1) if chain.births is None else chain.births
+    frame = pd.DataFrame(
+        {
+            "niche": elites.niche,
+            "index": [archive.niches.label(int(state)) for state in elites.niche],
+            "uid": elites.uid,
+            "depth": elites.depth,
+            "value": value,
+            "low": low,
+            "high": high,
+            "standard_error": error,
+            "births": births[elites.niche],
+            "recorded": np.asarray(children.sum(axis=1)).ravel(),
+            "saturated": saturated,
+        }
+    )
+    return frame.sort_values("value", ascending=False, kind="stable").reset_index(drop=True)
+
+
+@dataclass(frozen=True)
+class _FirstRows:
+    """D of every elite, (K, S): shares of its own children, and the rest from its niche's row of T."""
+
+    shares: sparse.csr_array
+    rest: Floats
+    transition: LinearOperator
+    states: NDArray[np.int64]
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Elites and states."""
+        return len(self.states), self.transition.shape[1]
+
+    def __matmul__(self, other: Floats, /) -> Floats:
+        onward: Floats = self.shares @ other
+        onward += self.rest[:, None] * (self.transition @ other)[self.states]
+        return onward
