@@ -55,6 +55,7 @@ PEERS = (
     "tests/domains/test_gym.py",
     "tests/execution/test_ray.py",
     "tests/plots/test_explorer_browser.py",
+    "tests/test_docs.py",
     "tests/variation/test_polynomial.py",
 )
 

@@ -16,6 +16,11 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Let ``pytest --refresh-docs tests/test_docs.py`` write what blocks print into their pages."""
+    parser.addoption("--refresh-docs", action="store_true", help="rewrite the outputs shown in the docs")
+
+
 @pytest.fixture(scope="session")
 def arm_archive(tmp_path_factory: pytest.TempPathFactory) -> nc.Archive:
     """A small archive of the arm, to read from."""

@@ -2,14 +2,17 @@
 
 Python blocks run unless a comment in the line before says otherwise; blocks of the shell run where one
 says so. A page shares its names and a folder. What a comment can say: ``run`` (a block of nichechain
-commands), ``slow`` (only with -m slow), ``skip: why``, ``output`` (what the block before printed).
+commands), ``slow`` (only with -m slow), ``needs NAME`` (only where that module is installed),
+``skip: why``, ``output`` (what the block before printed). ``pytest --refresh-docs tests/test_docs.py``
+writes what the blocks print now into their pages.
 """
 
 import ast
+import dataclasses
+import importlib.util
 import math
 import re
 import shlex
-from dataclasses import dataclass
 from pathlib import Path
 
 import matplotlib
@@ -28,7 +31,7 @@ _SNIPPET = re.compile(r'^--8<-- "(?P<path>[^":]+)(?::(?P<ranges>[\d:,]+))?"$', r
 _NUMBER = re.compile(r"-?\d+(?:\.\d+)?")
 
 
-@dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True)
 class Block:
     """A fenced block of a page."""
 
@@ -37,10 +40,14 @@ class Block:
     said: str
     code: str
     output: str | None = None
+    shown: tuple[int, int] = (0, 0)  # where the page has the output
 
     @property
     def runs(self) -> bool:
-        if self.said.startswith("skip"):
+        words = self.said.split()
+        if words[:1] == ["skip:"]:
+            return False
+        if "needs" in words and importlib.util.find_spec(words[words.index("needs") + 1]) is None:
             return False
         return self.kind == "python" or (self.kind == "sh" and self.said.startswith("run"))
 
@@ -57,7 +64,8 @@ def blocks_of(text: str) -> list[Block]:
         code = "\n".join(line.removeprefix(match["indent"]) for line in match["code"].splitlines())
         if said == "output":
             last = found.pop()
-            found.append(Block(last.line, last.kind, last.said, last.code, code))
+            where = match.span("code")
+            found.append(dataclasses.replace(last, output=code, shown=where))
         else:
             line = text.count("\n", 0, match.start("code")) + 1
             found.append(Block(line, match["kind"], said, _SNIPPET.sub(_included, code)))
@@ -108,19 +116,30 @@ def _cases():
 
 
 @pytest.mark.parametrize(("page", "slow"), list(_cases()))
-def test_blocks_of_a_page_run(page, slow, tmp_path, monkeypatch, capsys):
+def test_blocks_of_a_page_run(page, slow, tmp_path, monkeypatch, capsys, request):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("COLUMNS", "100")
     matplotlib.use("agg")
     names: dict[str, object] = {"__name__": "__docs__"}
-    for block in blocks_of(page.read_text(encoding="utf-8")):
+    text = page.read_text(encoding="utf-8")
+    fresh: list[tuple[tuple[int, int], str]] = []
+    for block in blocks_of(text):
         if block.slow and not slow:
             continue
         capsys.readouterr()
         run(block, names, page)
         printed = capsys.readouterr().out
-        if block.output is not None:
+        if block.output is None:
+            continue
+        if request.config.getoption("refresh_docs"):
+            lines = [line.rstrip() for line in printed.strip("\n").splitlines()]
+            fresh.append((block.shown, "".join(f"{line}\n" for line in lines)))
+        else:
             assert alike(printed, block.output), f"{page.name}:{block.line} prints\n{printed}"
+    for (first, last), printed in reversed(fresh):
+        text = text[:first] + printed + text[last:]
+    if fresh:
+        page.write_text(text, encoding="utf-8")
 
 
 @pytest.mark.parametrize(
