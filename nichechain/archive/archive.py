@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 from nichechain import variation
 from nichechain.archive import read
 from nichechain.archive.trust import check_trusted
+from nichechain.births.orphans import orphan_note
 from nichechain.chain import NicheChain, TransitionCounts, estimate
 from nichechain.chain.filters import counts_of
 from nichechain.core.errors import ArchiveError, NichechainError
@@ -192,6 +194,13 @@ class Archive:
         return frame.rename(columns=names)
 
     @cached_property
+    def orphan_note(self) -> str | None:
+        """What to say where most imported births after the first batch have no parent, else None."""
+        if not self.meta.imported:
+            return None
+        return orphan_note(read.read_births(self.folder, self.meta, ["parent_niche", "step"]))
+
+    @cached_property
     def counts(self) -> TransitionCounts:
         """Births from niche to niche."""
         return self.counts_of()
@@ -211,12 +220,16 @@ class Archive:
     def chain(self, estimator: str = "empirical-bayes", **options: Any) -> NicheChain:
         """The Markov chain over niches, estimated from all births.
 
+        It warns where births came from another program that lost most of their parents.
+
         Parameters
         ----------
         estimator : {"empirical-bayes", "dirichlet", "mle"}
         **options
             Of :func:`nichechain.chain.estimate`, such as ``unvisited="self"``.
         """
+        if self.orphan_note is not None:
+            warnings.warn(self.orphan_note, stacklevel=2)
         return estimate(self.counts, estimator, **options)  # type: ignore[arg-type]
 
 

@@ -152,6 +152,7 @@ def write_archive(
     *,
     state: SearchState | None = None,
     objective_name: str = "objective",
+    overwrite: bool = False,
 ) -> None:
     """Make an archive of births that no build made.
 
@@ -168,6 +169,8 @@ def write_archive(
     state : SearchState, optional
         Elites, by default none.
     objective_name : str
+    overwrite : bool
+        Whether an archive that the folder holds may go, if its births were imported as well.
 
     Raises
     ------
@@ -187,10 +190,24 @@ def write_archive(
     )
     with writing(folder):
         if read.is_archive(folder):
-            raise ArchiveError(f"{folder} already holds an archive: import into another folder")
+            _clear(folder, overwrite)
         writer = write.Writer(folder, config, facts, origin, niches=niches)
         writer.append(rows)
         writer.commit(state or _nothing_to_go_on_with(len(rows), dimensions))
+
+
+def _clear(folder: Path, overwrite: bool) -> None:
+    """Make room where that is wanted; nobody's build goes for somebody's log."""
+    if not overwrite:
+        raise ArchiveError(
+            f"{folder} already holds an archive: import into another folder, or overwrite this one"
+        )
+    if not read.read_meta(folder).imported:
+        raise ArchiveError(
+            f"{folder} holds an archive that was not imported, which is not overwritten: "
+            "import into another folder"
+        )
+    write.clear(folder)
 
 
 def _read(log: Path, content: bytes) -> pa.Table:

@@ -29,6 +29,7 @@ _SHARED = (
     "shape",
     "bounds",
     "outside",
+    "epsilon",
     "mutation",
     "scale",
     "df",

@@ -12,7 +12,7 @@ depth : int32
 parent_niche, child_niche : int32
     States of the chain; null where there is no parent, or where the child failed.
 behavior_0, behavior_1, ... : float64, null where the child failed
-objective : float64, null where the child failed
+objective : float64, null where the child failed, or where the search has none
 accepted : bool
     Whether the child became its niche's elite, births being offered one by one.
 failed : string
@@ -143,7 +143,7 @@ def make_table(
         pa.array(offspring.parent_niche, mask=offspring.parent_niche == NONE),
         pa.array(child_niche, mask=child_niche == NONE),
         *(pa.array(evaluation.behavior[:, axis], mask=failed) for axis in range(axes)),
-        pa.array(evaluation.objective, mask=failed),
+        pa.array(evaluation.objective, mask=failed | np.isnan(evaluation.objective)),
         accepted,
         pa.array(evaluation.reasons, pa.string(), mask=~failed),
         np.full(n, step, np.int32),

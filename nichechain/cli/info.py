@@ -48,6 +48,7 @@ def run(arguments: Sequence[str]) -> int:
         "births_outside": counts.births_outside,
         "births_of_lineages": of_lineages,
         "births_of_calibrations": meta.births - meta.built,
+        "births_with_a_parent": int(counts.births.sum()),
         "births_failed": meta.births - int(counts.visits.sum()),
         "deepest_elite": int(archive.elites.depth.max()) if len(archive.elites) else 0,
         "genotype_length": int(archive.elites.genotype.shape[1]),
@@ -97,6 +98,8 @@ def run(arguments: Sequence[str]) -> int:
     else:
         shown.print("\n[bold]Configuration[/]" + (" of the first run" if meta.origin else ""))
         shown.print(output.facts({name: _plain(value) for name, value in config.to_json().items()}))
+    if archive.orphan_note is not None:
+        shown.print(f"\n[bold]Warning:[/] {archive.orphan_note}")
     shown.print("\n[bold]Versions[/]")
     shown.print(output.facts(meta.versions))
     return 0

@@ -4,19 +4,18 @@ from __future__ import annotations
 
 import math
 import operator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from nichechain.core.checks import as_bounds, as_shape, check_choice
+from nichechain.core.checks import as_bounds, as_shape, check_choice, check_numbers
 from nichechain.core.errors import NichechainError
 from nichechain.niches.base import MOST_NICHES, OUTSIDE_MODES, Floats, Ints, Niche, Niches, check_bounds
 
-# pyribs adds this to a scaled coordinate before it rounds down (its default ``epsilon``), and the
-# two must put a behavior in the same cell.
-_EPSILON = 1e-6
+EPSILON = 1e-6
+"""What pyribs adds to a scaled coordinate before it rounds down, unless told otherwise."""
 
 
 @dataclass(frozen=True)
@@ -33,6 +32,9 @@ class GridNiches(Niches):
         What a behavior out of bounds belongs to. ``state``: a state of its own, numbered last,
         whose elite can be a parent. ``absorb``: a state that no lineage leaves. ``clip``: the
         nearest niche on the edge, as in pyribs.
+    epsilon : float
+        Added to a scaled coordinate before it is rounded down, as in pyribs, whose archives and these
+        niches must put a behavior in the same cell.
 
     Raises
     ------
@@ -43,6 +45,7 @@ class GridNiches(Niches):
     shape: tuple[int, ...]
     bounds: tuple[tuple[float, float], ...]
     outside: str = "state"
+    epsilon: float = field(default=EPSILON, repr=False)
 
     kind: ClassVar[str] = "grid"
 
@@ -59,6 +62,10 @@ class GridNiches(Niches):
             )
         check_bounds(self.bounds)
         check_choice("outside", self.outside, OUTSIDE_MODES)
+        check_numbers(epsilon=self.epsilon)
+        if not 0 <= self.epsilon < math.inf:
+            raise NichechainError(f"epsilon is {self.epsilon}, but must be finite and not negative")
+        object.__setattr__(self, "epsilon", float(self.epsilon))
 
     def __len__(self) -> int:
         """Number of niches; the outside state is not one."""
@@ -73,7 +80,7 @@ class GridNiches(Niches):
 
     def _nearest(self, points: Floats) -> Ints:
         shape = np.array(self.shape)
-        scaled = (shape * (points - self.lower) + _EPSILON) / (self.upper - self.lower)
+        scaled = (shape * (points - self.lower) + self.epsilon) / (self.upper - self.lower)
         index = np.clip(scaled, 0, shape - 1).astype(np.int64)
         flat: Ints = np.ravel_multi_index(tuple(index.T), self.shape).astype(np.int64)
         return flat
@@ -113,7 +120,8 @@ class GridNiches(Niches):
 
     def settings(self) -> dict[str, Any]:
         """What the configuration of a build says of these niches."""
-        return {"niches": self.kind, "shape": self.shape, "bounds": self.bounds, "outside": self.outside}
+        of_grid = {"shape": self.shape, "bounds": self.bounds, "outside": self.outside}
+        return {"niches": self.kind, **of_grid, "epsilon": self.epsilon}
 
     def as_grid(self, values: ArrayLike) -> NDArray[Any]:
         """Values of all niches (n,) laid out as the grid."""

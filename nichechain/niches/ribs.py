@@ -33,7 +33,8 @@ def niches_of(archive: Any, outside: str) -> Niches:
         )
     bounds = tuple(zip(archive.lower_bounds.tolist(), archive.upper_bounds.tolist(), strict=True))
     if isinstance(archive, GridArchive):
-        return GridNiches(tuple(archive.dims.tolist()), bounds, outside)
+        # By its digits: 1e-6 in float32 is another number, and the same epsilon.
+        return GridNiches(tuple(archive.dims.tolist()), bounds, outside, float(str(archive.epsilon)))
     return CVTNiches(archive.centroids.astype(np.float64), bounds, outside)
 
 
@@ -56,7 +57,7 @@ def empty_archive(niches: Niches, **options: Any) -> Any:
 
     match niches:
         case GridNiches():
-            return GridArchive(dims=niches.shape, ranges=niches.bounds, **options)
+            return GridArchive(dims=niches.shape, ranges=niches.bounds, epsilon=niches.epsilon, **options)
         case CVTNiches():
             return CVTArchive(centroids=niches.centroids, ranges=niches.bounds, **options)
         case _:

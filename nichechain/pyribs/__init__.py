@@ -23,7 +23,8 @@ from typing import TYPE_CHECKING
 
 from nichechain.core.lazy import lazily
 from nichechain.pyribs.conversion import from_ribs, to_ribs
-from nichechain.pyribs.recording import Recording, record
+from nichechain.pyribs.recording import Recording
+from nichechain.pyribs.schedulers import record
 
 if TYPE_CHECKING:
     from nichechain.pyribs.emitters import MutationEmitter

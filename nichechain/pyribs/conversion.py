@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -9,33 +10,49 @@ import numpy as np
 import pyarrow as pa
 
 from nichechain.archive.imported import Axes, write_archive
+from nichechain.births.orphans import orphan_note
 from nichechain.births.table import NONE, Offspring, make_table
 from nichechain.core.errors import NichechainError
 from nichechain.domains.base import Evaluation
 from nichechain.niches.ribs import empty_archive, niches_of
-from nichechain.pyribs.recording import Recording
+from nichechain.pyribs.recording import Recording, recording_of
 from nichechain.search.elites import Elites, SearchState
 
 if TYPE_CHECKING:
     from nichechain.archive.archive import Archive
 
+_OF_ELITES = (
+    "a finished archive of pyribs has its elites and not whom they came from, so T cannot be estimated from "
+    "it: record the next search with nichechain.pyribs.record(scheduler)"
+)
+
 
 def from_ribs(
-    source: Any, folder: str | Path, *, axes: Axes | None = None, objective_name: str = "objective"
+    source: Any,
+    folder: str | Path,
+    *,
+    axes: Axes | None = None,
+    objective_name: str = "objective",
+    overwrite: bool = False,
 ) -> Archive:
     """Write a search of pyribs as an archive folder.
 
+    It warns if most births after the first batch have no known parent.
+
     Parameters
     ----------
-    source : Recording or ribs.archives.GridArchive or CVTArchive
-        A recording has births, and with them counts and a chain. A finished archive has no more
-        than its elites: each becomes an initial birth, and nothing is known of who came from where.
+    source : Recording, or what is being recorded, or ribs.archives.GridArchive or CVTArchive
+        A recording has births, and with them counts and a chain; its scheduler or archive stands for
+        it. A finished archive has no more than its elites: each becomes an initial birth, and nothing
+        is known of who came from where.
     folder : path
-        Where the archive goes; it must not hold one.
+        Where the archive goes.
     axes : Axes, optional
         What the measures are called, and their unit.
     objective_name : str
         What the objective is, with its unit.
+    overwrite : bool
+        Whether an archive that the folder holds may go, if it was imported like this one.
 
     Returns
     -------
@@ -46,7 +63,7 @@ def from_ribs(
     NichechainError
         If the source is of another kind or empty, or the axes do not fit.
     ArchiveError
-        If the folder holds an archive.
+        If the folder holds an archive that must stay.
 
     Notes
     -----
@@ -57,12 +74,18 @@ def from_ribs(
 
     from nichechain.archive.archive import load
 
+    source = recording_of(source) or source
     if isinstance(source, Recording):
-        archive, niches, rows = source.archive, source.niches, source.births()
+        archive, niches, rows = source.home, source.niches, source.births()
         cells, uid, depth = source.elites()
         step = source.step
         emitters = source.conventions()
     else:
+        if hasattr(source, "ask") and hasattr(source, "archive"):
+            raise NichechainError(
+                f"source is a {type(source).__name__} that is not being recorded, so nothing is known of its "
+                "births: it must be recorded before its loop, as in recording = record(scheduler)"
+            )
         archive, niches = source, niches_of(source, "clip")
         cells = source.data("index").astype(np.int64)
         uid, depth = np.arange(cells.size), np.zeros(cells.size, np.int64)
@@ -75,11 +98,23 @@ def from_ribs(
     origin = {
         "kind": "imported",
         "program": f"pyribs {ribs.__version__}",
-        "archive": type(archive).__name__,
+        "archive": type(source.archive if isinstance(source, Recording) else source).__name__,
         "emitters": emitters,
     }
     state = SearchState.at_rest(elites, len(rows), step)
-    write_archive(folder, niches, rows, origin, axes or Axes(), state=state, objective_name=objective_name)
+    write_archive(
+        folder,
+        niches,
+        rows,
+        origin,
+        axes or Axes(),
+        state=state,
+        objective_name=objective_name,
+        overwrite=overwrite,
+    )
+    note = orphan_note(rows) if isinstance(source, Recording) else _OF_ELITES
+    if note is not None:
+        warnings.warn(note, stacklevel=2)
     return load(folder)
 
 

@@ -2,77 +2,67 @@
 
 from __future__ import annotations
 
-from collections import defaultdict, deque
-from collections.abc import Iterable
+from collections import deque
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from functools import partial
+from types import TracebackType
 from typing import Any, Literal, get_args
 
 import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from nichechain import births
-from nichechain.births.table import NONE, Offspring
+from nichechain.births.table import NONE
 from nichechain.core.checks import check_choice
 from nichechain.core.errors import NichechainError
-from nichechain.domains.base import Evaluation
 from nichechain.niches import Niches
 from nichechain.niches.base import is_inside, precision_of
-from nichechain.niches.ribs import niches_of
-from nichechain.pyribs.strategies import StrategyParent, centre, is_strategy
+from nichechain.pyribs.batches import are_batch, finite, one_by_one, spread
+from nichechain.pyribs.emissions import Emissions
+from nichechain.pyribs.ledger import Ledger
+from nichechain.pyribs.parents import Parents, StrategyConvention
+from nichechain.pyribs.places import as_bytes, home_of, place_of
+from nichechain.pyribs.strategies import check_draws
 
-Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
-StrategyConvention = Literal["mean", "restart"]
+Bools = NDArray[np.bool_]
 Outside = Literal["state", "clip"]
 
-_NOT_FINITE = "objective or measures are not finite"
-
-
-def record(
-    scheduler: Any, *, outside: Outside = "state", strategy_parent: StrategyConvention = "mean"
-) -> Recording:
-    """Record a scheduler of pyribs from now on.
-
-    Parameters
-    ----------
-    scheduler : ribs.schedulers.Scheduler or BanditScheduler
-        Its archive must be a GridArchive or CVTArchive.
-    outside, strategy_parent
-        See :class:`Recording`.
-
-    Returns
-    -------
-    Recording
-
-    Raises
-    ------
-    NichechainError
-        If the archive is of another kind, or is being recorded already.
-    """
-    emitters = getattr(scheduler, "emitter_pool", None)
-    if emitters is None:
-        emitters = scheduler.emitters
-    return Recording(scheduler.archive, emitters, outside=outside, strategy_parent=strategy_parent)
+_OF_ARCHIVES = ("add", "add_single", "sample_elites", "clear")
+_OF_EMITTERS = ("ask", "ask_dqd", "tell", "tell_dqd")
 
 
 class Recording:
     """The births of a search of pyribs, as they happen.
 
-    It looks on as emitters draw elites and as solutions are added. The search is the one that it
-    would be without, bit for bit, but for one thing: solutions with an objective or measures that
-    are not finite become failed births, where pyribs would raise for the whole batch.
+    It looks on as elites are drawn and solutions added. The search is the one that it would be
+    without, bit for bit, but for one thing: solutions with an objective or measures that are not
+    finite become failed births, where pyribs would raise for the whole batch.
+
+    A loop of your own, without a scheduler, is recorded while its block runs::
+
+        with Recording(archive) as recording:
+            for _ in range(iterations):
+                elites = archive.sample_elites(32)
+                recording.parents(elites)
+                archive.add(*evaluate(mutate(elites["solution"])))
 
     Parameters
     ----------
-    archive : ribs.archives.GridArchive or CVTArchive
-        Where emitters draw their elites from. Elites that it holds already become initial births.
+    archive : archive of pyribs
+        What the search adds to. Elites that it holds already become initial births.
     emitters : iterable of ribs.emitters.EmitterBase
+    result_archive : archive of pyribs, optional
+        What the search adds to as well.
+    niches : Niches, optional
+        Where births are counted; by default the cells of ``archive``, or of ``result_archive`` where
+        that is the one with cells (novelty search, density descent).
     outside : {"state", "clip"}
-        Where measures out of range belong. pyribs puts them in the nearest cell without a word;
-        ``state`` records them in a state of their own, ``clip`` in that cell. A solution that pyribs
-        keeps in an edge cell may be drawn as an elite either way, and its children then come from
-        the state that it is recorded in.
+        Where measures out of range belong, unless ``niches`` say it. pyribs puts them in the nearest
+        cell without a word; ``state`` records them in a state of their own, ``clip`` in that cell. A
+        solution that pyribs keeps in an edge cell may be drawn as an elite either way, and its
+        children then come from the state that it is recorded in.
     strategy_parent : {"mean", "restart"}
         Whom the solutions of an evolution strategy come from, since it draws no elites for them.
         ``mean``: of the births of the emitter's last batch, the one nearest to its mean; where it
@@ -82,68 +72,78 @@ class Recording:
     Raises
     ------
     NichechainError
-        If the archive is of another kind, or is being recorded already.
+        If no archive has cells that last and no niches are given, an emitter draws no elites, or the
+        archive is being recorded already.
 
     Notes
     -----
     Parents are exact for emitters that draw as many elites as they emit solutions (GaussianEmitter,
     GeneticAlgorithmEmitter with an operator of one parent, :class:`MutationEmitter`). Of those that
     draw a multiple (IsoLineEmitter, whose first n elites get the isotropic noise and whose second n
-    the directions), the first n count. What an emitter emits while the archive is empty are initial
-    births, as are solutions that no emitter made. Which convention holds is part of the archive.
+    the directions), the first n count. Branches of a GradientOperatorEmitter come from the solutions
+    that they branch at. What an emitter emits while the archive is empty are initial births, as are
+    solutions that no emitter made. Which convention holds is part of the archive.
     """
 
     def __init__(
         self,
         archive: Any,
-        emitters: Iterable[Any],
+        emitters: Iterable[Any] = (),
         *,
+        result_archive: Any = None,
+        niches: Niches | None = None,
         outside: Outside = "state",
         strategy_parent: StrategyConvention = "mean",
     ) -> None:
         check_choice("outside", outside, get_args(Outside))
         check_choice("strategy_parent", strategy_parent, get_args(StrategyConvention))
-        if isinstance(getattr(archive.__dict__.get("add"), "__self__", None), Recording):
+        if recording_of(archive) is not None:
             raise NichechainError("the archive is being recorded already: use that recording")
-        self.niches: Niches = niches_of(archive, outside)
         self.archive = archive
         self.emitters = list(emitters)
         self.strategy_parent = strategy_parent
-        self._clip = outside == "clip"
+        check_draws(self.emitters, (archive, result_archive))
+        self.home, self.niches = home_of(archive, result_archive, niches, outside)
+        self._asked_for = (niches, outside, strategy_parent)
         self._step = 0
-        self._told = False
-        self._niche: list[int] = []
-        self._depth: list[int] = []
-        self._uid_at: dict[int, int] = {}
-        self._tables: list[pa.Table] = []
-        # Where solutions that were emitted and not yet added come from.
-        self._emitted: dict[bytes, deque[tuple[int, int]]] = defaultdict(deque)
+        self._told = self._busy = self._adding = False
+        self._ledger = Ledger(len(self.niches.bounds))
+        self._emissions = Emissions()
         self._drawn: list[Ints] = []
-        self._elites_each: dict[int, int] = {}
-        self._strategies = {
-            number: StrategyParent() for number, emitter in enumerate(self.emitters) if is_strategy(emitter)
-        }
-        if not archive.empty:
-            self._record_elites()
-        # Instances are overlaid, not classes, so that other archives and emitters stay as they are.
-        for name in ("add", "add_single", "sample_elites", "clear"):
-            setattr(archive, name, getattr(self, f"_{name}"))
-        for number, emitter in enumerate(self.emitters):
-            for name in ("ask", "ask_dqd"):
-                setattr(emitter, name, partial(self._ask, number, name))
-            emitter.tell = partial(self._tell, number)
+        self._announced: deque[int] = deque()
+        self._parents = Parents(self.emitters, strategy_parent)
+        drawn = [emitter.archive for emitter in self.emitters] or [archive]
+        self._places = [place_of(each) for each in _distinct([self.home, *drawn])]
+        known = [each for each in (archive, result_archive) if each is not None]
+        self._filled = [each for each in known if each is archive or _among(each, [self.home, *drawn])]
+        self._offered: list[Bools | None] = [None] * len(self._filled)
+        self._record_elites()
+        self._look_on(known)
 
     def __repr__(self) -> str:
-        return f"Recording({len(self)} births, {len(self.archive)} of {len(self.niches)} cells filled)"
+        return f"Recording({len(self)} births, {len(self.home)} of {len(self.niches)} cells filled)"
 
     def __len__(self) -> int:
         """Number of births."""
-        return len(self._niche)
+        return len(self._ledger)
+
+    def __enter__(self) -> Recording:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.stop()
+
+    def stop(self) -> None:
+        """Look on no more: what happens from now on is not recorded."""
+        for each in (*self._filled, *(place.archive for place in self._places), *self.emitters):
+            for name in (*_OF_ARCHIVES, *_OF_EMITTERS):
+                vars(each).pop(name, None)
 
     def births(self) -> pa.Table:
         """The births so far, with the columns of :mod:`nichechain.births.table`."""
-        empty = births.schema(self.archive.measure_dim).empty_table()
-        return pa.concat_tables([empty, *self._tables])
+        return self._ledger.table()
 
     @property
     def step(self) -> int:
@@ -151,238 +151,278 @@ class Recording:
         return self._step
 
     def elites(self) -> tuple[Ints, Ints, Ints]:
-        """Cells of the elites in pyribs' archive, and their births: uid and depth, each (K,)."""
-        cells = self.archive.data("index").astype(np.int64)
-        uid = np.array([self._uid_at[cell] for cell in cells.tolist()], np.int64)
-        return cells, uid, np.array(self._depth, np.int64)[uid]
+        """Cells of the elites, and their births: uid and depth, each (K,)."""
+        data = self.home.data(["index", "solution", "measures"])
+        uid = self._places[0].births_of(data)
+        return data["index"].astype(np.int64), uid, self._ledger.depths(uid)
 
     def conventions(self) -> list[dict[str, str]]:
         """For every emitter its class and who counts as the parent of what it emits."""
-        return [
-            {"emitter": type(emitter).__name__, "parent": self._convention(number)}
-            for number, emitter in enumerate(self.emitters)
-        ]
+        return self._parents.conventions()
 
-    def _convention(self, number: int) -> str:
-        if number in self._strategies:
-            return {
-                "mean": "the birth of its last batch nearest to its mean, or the elite of a restart since",
-                "restart": "the last elite that it restarted from",
-            }[self.strategy_parent]
-        match self._elites_each.get(number, 0):
-            case 0:
-                return "none: it drew no elites"
-            case 1:
-                return "the elite that was drawn"
-            case several:
-                return f"the first of {several} elites that were drawn"
+    def parents(self, elites: Any) -> None:
+        """Say whose children the next solutions are that a loop of your own adds.
+
+        Parameters
+        ----------
+        elites : dict or ints
+            As ``archive.sample_elites`` or ``archive.data`` gives them, or the numbers of their
+            cells: one for each solution that is added next, in order.
+
+        Raises
+        ------
+        NichechainError
+            If one of them is no elite of the archive.
+        """
+        place = next((each for each in self._places if each.archive is self.archive), self._places[0])
+        if not isinstance(elites, dict):
+            elites = place.at(elites)
+        uid = place.births_of(elites)
+        if (uid == NONE).any():
+            raise NichechainError(
+                f"parent {int(np.argmax(uid == NONE))} is no elite that was recorded: parents are elites as "
+                "archive.sample_elites gives them, from the archive as it is now"
+            )
+        self._begin()
+        self._announced = deque(uid.tolist())
+
+    def check_settings(self, niches: Niches | None, outside: str, strategy_parent: str) -> None:
+        """Refuse settings that this recording does not have.
+
+        Raises
+        ------
+        NichechainError
+            If one of them differs.
+        """
+        names = ("niches", "outside", "strategy_parent")
+        given = (niches, outside, strategy_parent)
+        for name, value, own in zip(names, given, self._asked_for, strict=True):
+            if value != own:
+                raise NichechainError(
+                    f"{name} is {value!r}, but the scheduler is being recorded already, with {own!r}, which "
+                    "must stay: stop() that recording first"
+                )
+
+    def _look_on(self, archives: list[Any]) -> None:
+        """Overlay instances, not classes, so that other archives and emitters stay as they are."""
+        for number, archive in enumerate(self._filled):
+            archive.add = partial(self._add, number)
+            archive.add_single = partial(self._add_single, number)
+        for number, place in enumerate(self._places):
+            if _among(place.archive, archives):
+                place.archive.sample_elites = partial(self._sample_elites, number)
+                place.archive.clear = partial(self._clear, number)
+        for number, emitter in enumerate(self.emitters):
+            for name in ("ask", "ask_dqd"):
+                setattr(emitter, name, partial(self._ask, number, name))
+            for name in ("tell", "tell_dqd"):
+                setattr(emitter, name, partial(self._tell, number, name))
 
     # What pyribs calls instead of its own.
 
-    def _sample_elites(self, *args: Any, **kwargs: Any) -> Any:
-        drawn = type(self.archive).sample_elites(self.archive, *args, **kwargs)
-        self._drawn.append(drawn["index"].astype(np.int64))
+    def _sample_elites(self, number: int, *args: Any, **kwargs: Any) -> Any:
+        place = self._places[number]
+        drawn = type(place.archive).sample_elites(place.archive, *args, **kwargs)
+        if self._busy:
+            self._drawn.append(place.births_of(drawn))
+        else:
+            self._begin()
         return drawn
 
-    def _clear(self) -> None:
-        type(self.archive).clear(self.archive)
-        self._uid_at.clear()
+    def _clear(self, number: int) -> None:
+        place = self._places[number]
+        type(place.archive).clear(place.archive)
+        if not self._adding:
+            place.forget()
 
-    def _ask(self, number: int, name: str) -> Any:
+    def _begin(self) -> None:
+        """An iteration begins where elites are drawn after births."""
         if self._told:
             self._told = False
             self._step += 1
-            self._emitted.clear()
-        emitter = self.emitters[number]
+            self._emissions = Emissions()
+
+    @contextmanager
+    def _drawing(self) -> Iterator[None]:
         self._drawn.clear()
-        solutions = getattr(type(emitter), name)(emitter)
-        parents = self._parents(number, len(solutions))
-        for key, parent in zip(self._keys(solutions), parents.tolist(), strict=True):
-            self._emitted[key].append((number, parent))
+        self._busy = True
+        try:
+            yield
+        finally:
+            self._busy = False
+
+    def _ask(self, number: int, name: str) -> Any:
+        self._begin()
+        emitter = self.emitters[number]
+        with self._drawing():
+            solutions = getattr(type(emitter), name)(emitter)
+        parents = self._parents.of(number, name, len(solutions), self._drawn)
+        self._emissions.emit(self._keys(solutions), number, parents)
         return solutions
 
-    def _tell(self, number: int, *args: Any, **kwargs: Any) -> Any:
+    def _tell(self, number: int, name: str, *args: Any, **kwargs: Any) -> Any:
         emitter = self.emitters[number]
-        self._drawn.clear()
-        result = type(emitter).tell(emitter, *args, **kwargs)
-        if number in self._strategies and self._drawn:
-            # While it is told, a strategy draws an elite only to restart from it.
-            (cell,) = self._drawn[-1].tolist()
-            self._strategies[number].restarted(self._uid_at[cell])
+        with self._drawing():
+            result = getattr(type(emitter), name)(emitter, *args, **kwargs)
+        self._parents.told(number, self._drawn)
         return result
 
-    def _add(self, solution: Any, objective: Any, measures: Any, **fields: Any) -> Any:
-        solution, objective, measures = np.asarray(solution), np.asarray(objective), np.asarray(measures)
-        add = partial(type(self.archive).add, self.archive)
-        if not _are_batch(solution, objective, measures):
+    def _add(self, number: int, solution: Any, objective: Any, measures: Any, **fields: Any) -> Any:
+        archive = self._filled[number]
+        solution, measures = np.asarray(solution), np.asarray(measures)
+        objective = None if objective is None else np.asarray(objective)
+        add = partial(self._own, archive, "add")
+        if not are_batch(solution, objective, measures):
             # pyribs says what is wrong with it.
-            return add(solution, None if objective.dtype == object else objective, measures, **fields)
-        fine = self._finite(objective, measures)
+            return add(solution, objective, measures, **fields)
+        self._check_announced(len(measures))
+        fine = finite(objective, measures)
         if fine.all():
             info = add(solution, objective, measures, **fields)
         else:
-            info = {"status": np.zeros(len(fine), np.int32), "value": np.full(len(fine), np.nan)}
+            some = {}
             if fine.any():
                 rest = {name: np.asarray(values)[fine] for name, values in fields.items()}
-                for name, values in add(solution[fine], objective[fine], measures[fine], **rest).items():
-                    info[name][fine] = values
-        self._record(solution, objective, measures, fine, np.asarray(info["status"]) > 0)
+                of_fine = None if objective is None else objective[fine]
+                some = add(solution[fine], of_fine, measures[fine], **rest)
+            info = spread(some, fine)
+        self._offer(number, solution, objective, measures, fine, np.asarray(info["status"]) > 0)
         return info
 
-    def _add_single(self, solution: Any, objective: Any, measures: Any, **fields: Any) -> Any:
+    def _add_single(self, number: int, solution: Any, objective: Any, measures: Any, **fields: Any) -> Any:
+        archive = self._filled[number]
+        add_single = partial(self._own, archive, "add_single")
+        if self._adding:
+            # An archive that adds a batch one by one, or its elites again, tells of no birth by that.
+            return add_single(solution, objective, measures, **fields)
         solution, measures = np.asarray(solution)[None], np.asarray(measures)[None]
-        one = np.asarray(objective)[None]
-        add_single = partial(type(self.archive).add_single, self.archive)
-        if not _are_batch(solution, one, measures):
+        one = None if objective is None else np.asarray(objective)[None]
+        if not are_batch(solution, one, measures):
             return add_single(solution[0], objective, measures[0], **fields)
-        fine = self._finite(one, measures)
+        fine = finite(one, measures)
         if fine[0]:
             info = add_single(solution[0], objective, measures[0], **fields)
         else:
-            info = {"status": np.int32(0), "value": np.float64(np.nan)}
-        self._record(solution, one, measures, fine, np.array([info["status"] > 0]))
+            info = {name: values[0] for name, values in spread({}, fine).items()}
+        entered = np.atleast_1d(np.asarray(info["status"]) > 0)
+        self._offer(number, solution, one, measures, fine, entered, single=True)
         return info
+
+    def _own(self, archive: Any, name: str, *args: Any, **kwargs: Any) -> Any:
+        """What the archive does itself."""
+        before, self._adding = self._adding, True
+        try:
+            return getattr(type(archive), name)(archive, *args, **kwargs)
+        finally:
+            self._adding = before
 
     # What is made of it.
 
-    def _parents(self, number: int, size: int) -> Ints:
-        """Births that the solutions of an emitter come from, (size,)."""
-        if number in self._strategies:
-            strategy = self._strategies[number]
-            if self.strategy_parent == "restart":
-                return np.full(size, strategy.restart)
-            return np.full(size, strategy.nearest(centre(self.emitters[number])))
-        drawn = np.concatenate(self._drawn) if self._drawn else np.empty(0, np.int64)
-        if not drawn.size:
-            if not self.archive.empty:
-                raise NichechainError(
-                    f"{type(self.emitters[number]).__name__} drew no elites from an archive that has some, "
-                    "so the parents of its solutions are not known: leave it out of the recording"
-                )
-            return np.full(size, NONE)
-        if drawn.size % size:
-            raise NichechainError(
-                f"{type(self.emitters[number]).__name__} drew {drawn.size} elites for {size} solutions, "
-                "so their parents are not known: it must draw as many, or a multiple"
-            )
-        self._elites_each[number] = drawn.size // size
-        return np.array([self._uid_at[cell] for cell in drawn[:size].tolist()], np.int64)
-
     def _keys(self, solutions: Any) -> list[bytes]:
-        """Solutions by their bytes, as the archive stores them."""
-        rows = np.ascontiguousarray(solutions, self.archive.dtypes["solution"])
-        return [row.tobytes() for row in rows]
+        """Solutions by their bytes, as the archive of elites stores them."""
+        return as_bytes(np.ascontiguousarray(solutions, self.home.dtypes["solution"]))
 
-    @staticmethod
-    def _finite(objective: NDArray[Any], measures: NDArray[Any]) -> NDArray[np.bool_]:
-        fine: NDArray[np.bool_] = np.isfinite(objective) & np.isfinite(measures).all(axis=1)
-        return fine
+    def _check_announced(self, size: int) -> None:
+        if self._announced and len(self._announced) < size:
+            raise NichechainError(
+                f"{size} solutions are added, but parents() named {len(self._announced)} parents: there must "
+                "be one for each"
+            )
+
+    def _offer(
+        self,
+        number: int,
+        solution: NDArray[Any],
+        objective: NDArray[Any] | None,
+        measures: NDArray[Any],
+        fine: Bools,
+        entered: Bools,
+        *,
+        single: bool = False,
+    ) -> None:
+        """Solutions are births once every archive of the search has been offered them."""
+        self._offered[number] = entered
+        if number < len(self._filled) - 1:
+            return
+        if any(each is None or len(each) != len(fine) for each in self._offered):
+            raise NichechainError(
+                f"{len(fine)} solutions were added to the result archive and not to the archive before it: "
+                "add the same to both, as a scheduler does"
+            )
+        entry = dict(zip(map(id, self._filled), self._offered, strict=True))
+        self._offered = [None] * len(self._filled)
+        nobody = np.zeros(len(fine), bool)
+        entries = [entry.get(id(place.archive), nobody) for place in self._places]
+        self._record(solution, objective, measures, fine, entries, single=single)
 
     def _record(
         self,
         solution: NDArray[Any],
-        objective: NDArray[Any],
+        objective: NDArray[Any] | None,
         measures: NDArray[Any],
-        fine: NDArray[np.bool_],
-        entered: NDArray[np.bool_],
+        fine: Bools,
+        entries: list[Any],
+        *,
+        single: bool = False,
     ) -> None:
-        """Note births that the archive has just been offered."""
+        """Note births, of which ``entries`` tells who entered which place."""
         self._told = True
-        origins = [
-            self._emitted[key].popleft() if self._emitted.get(key) else (NONE, NONE)
-            for key in self._keys(solution)
-        ]
-        first = len(self)
-        uid = np.arange(first, first + len(fine))
-        cell = np.full(len(fine), NONE)
+        size = len(fine)
+        worth = np.zeros(size) if objective is None else objective
+        if not _among(self.home, self._filled) and fine.any():
+            entries[0] = np.zeros(size, bool)
+            entries[0][fine] = self.home.add(solution[fine], worth[fine], measures[fine])["status"] > 0
+        emitter, parents = self._emissions.take(self._keys(solution), single=single)
+        if self._announced:
+            parents = np.array([self._announced.popleft() for _ in range(size)], np.int64)
+        uid = np.arange(len(self), len(self) + size)
+        cell = np.full(size, NONE)
         state = cell.copy()
         if fine.any():
-            cell[fine] = self.archive.index_of(measures[fine])
-            state[fine] = cell[fine] if self._clip else self._states(measures[fine], cell[fine])
-        parents = np.array([parent for _, parent in origins], np.int64)
-        known = parents != NONE
-        parent_niche, depth = np.full(len(fine), NONE), np.zeros(len(fine), np.int64)
-        parent_niche[known] = [self._niche[parent] for parent in parents[known].tolist()]
-        depth[known] = [self._depth[parent] + 1 for parent in parents[known].tolist()]
-        self._niche += state.tolist()
-        self._depth += depth.tolist()
-        self._note_elites(solution, objective, measures, cell, entered, first)
-        for number, strategy in self._strategies.items():
-            own = np.array([emitter == number for emitter, _ in origins]) & fine
-            if own.any():
-                strategy.born(solution[own].reshape(np.count_nonzero(own), -1), uid[own], self._step)
-        offspring = Offspring(
-            np.empty((len(fine), 0), np.float32), uid, parents, parent_niche, depth, np.zeros(len(fine), bool)
-        )
-        evaluation = Evaluation(
-            np.where(fine[:, None], measures, np.nan).astype(np.float64),
-            np.where(fine, objective, np.nan).astype(np.float64),
-            ~fine,
-            tuple("" if good else _NOT_FINITE for good in fine),
-        )
-        accepted = _one_by_one(cell, objective, entered)
-        self._tables.append(
-            births.make_table(offspring, evaluation, child_niche=state, accepted=accepted, step=self._step)
-        )
+            cell[fine] = self.home.index_of(measures[fine])
+            state[fine] = self._states(measures[fine], cell[fine])
+        for place, entered in zip(self._places, entries, strict=True):
+            place.note(solution, worth, measures, entered, len(self))
+        self._parents.born(emitter, solution, uid, fine, self._step)
+        told = np.full(size, np.nan) if objective is None else objective.astype(np.float64)
+        accepted = one_by_one(cell, worth, entries[0])
+        self._ledger.add(parents, measures.astype(np.float64), told, fine, state, accepted, self._step)
 
     def _states(self, measures: NDArray[Any], cell: Ints) -> Ints:
         """Cells as pyribs numbers them, and the outside state for what is out of range."""
+        if self.niches.outside == "clip":
+            return cell
         inside = is_inside(measures.astype(np.float64), self.niches.bounds, precision_of(measures))
         return np.where(inside, cell, len(self.niches))
 
-    def _note_elites(
-        self,
-        solution: NDArray[Any],
-        objective: NDArray[Any],
-        measures: NDArray[Any],
-        cell: Ints,
-        entered: NDArray[np.bool_],
-        first: int,
-    ) -> None:
-        """Which of some births are elites now; an add tells neither cells nor which of several won."""
-        rows = np.flatnonzero(entered)
-        if not rows.size:
-            return
-        dtypes = self.archive.dtypes
-        _, elites = self.archive.retrieve(measures[rows])
-        same = np.all(
-            [
-                (solution[rows].astype(dtypes["solution"]) == elites["solution"])
-                .reshape(len(rows), -1)
-                .all(axis=1),
-                objective[rows].astype(dtypes["objective"]) == elites["objective"],
-                (measures[rows].astype(dtypes["measures"]) == elites["measures"]).all(axis=1),
-            ],
-            axis=0,
-        )
-        # Of equals in a batch pyribs keeps the first, which here is written last.
-        for row in rows[same][::-1].tolist():
-            self._uid_at[int(cell[row])] = first + row
-
     def _record_elites(self) -> None:
         """Elites that were there before become initial births."""
-        data = self.archive.data(["solution", "objective", "measures"])
-        fine = np.ones(len(data["objective"]), bool)
-        self._record(data["solution"], data["objective"], data["measures"], fine, fine)
+        for number, place in enumerate(self._places):
+            if place.archive.empty:
+                continue
+            data = place.archive.data(["solution", "objective", "measures", "index"])
+            new = place.births_of(data) == NONE
+            solution, objective, measures = (
+                data[name][new] for name in ("solution", "objective", "measures")
+            )
+            fine = np.ones(len(objective), bool)
+            entries = [fine if each == number else ~fine for each in range(len(self._places))]
+            if fine.size:
+                self._record(solution, objective, measures, fine, entries)
 
 
-def _are_batch(solution: NDArray[Any], objective: NDArray[Any], measures: NDArray[Any]) -> bool:
-    """Whether solutions, objectives and measures are as many numbers as they should be."""
-    numbers = all(np.issubdtype(values.dtype, np.number) for values in (objective, measures))
-    shaped = solution.ndim >= 1 and objective.ndim == 1 and measures.ndim == 2
-    return numbers and shaped and len(solution) == len(objective) == len(measures)
+def recording_of(searched: Any) -> Recording | None:
+    """The recording of an archive, or of the archive of a scheduler, if there is one."""
+    archive = getattr(searched, "archive", searched)
+    overlay = vars(archive).get("add") if hasattr(archive, "__dict__") else None
+    owner = getattr(getattr(overlay, "func", None), "__self__", None)
+    return owner if isinstance(owner, Recording) else None
 
 
-def _one_by_one(cell: Ints, objective: NDArray[Any], entered: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Who would have become an elite, births of a batch being offered one by one.
+def _among(one: Any, several: Iterable[Any]) -> bool:
+    """Whether an object is one of several; archives have no equality worth the name."""
+    return any(each is one for each in several)
 
-    pyribs says who is better than the elites before the batch, of which all but one are not kept.
-    """
-    best: dict[int, float] = {}
-    accepted = entered.copy()
-    for row in np.flatnonzero(entered).tolist():
-        niche, value = int(cell[row]), float(objective[row])
-        accepted[row] = value > best.get(niche, -np.inf)
-        if accepted[row]:
-            best[niche] = value
-    return accepted
+
+def _distinct(archives: list[Any]) -> list[Any]:
+    return [each for number, each in enumerate(archives) if not _among(each, archives[:number])]

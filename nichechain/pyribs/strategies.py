@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -19,6 +20,31 @@ def is_strategy(emitter: Any) -> bool:
     from ribs.emitters import EvolutionStrategyEmitter, GradientArborescenceEmitter
 
     return isinstance(emitter, (EvolutionStrategyEmitter, GradientArborescenceEmitter))
+
+
+def check_draws(emitters: Iterable[Any], archives: Iterable[Any]) -> None:
+    """Refuse emitters of which it is known beforehand that nobody could be the parent of what they emit.
+
+    Raises
+    ------
+    NichechainError
+        If an emitter takes solutions from a model, or draws elites from an archive that is none of these.
+    """
+    from ribs.emitters import BayesianOptimizationEmitter
+
+    filled = [archive for archive in archives if archive is not None]
+    for emitter in emitters:
+        name = type(emitter).__name__
+        if isinstance(emitter, BayesianOptimizationEmitter):
+            raise NichechainError(
+                f"a {name} takes its solutions from a model and draws no elites, so that nobody is their "
+                "parent: record a search whose emitters draw elites"
+            )
+        if not any(archive is emitter.archive for archive in filled):
+            raise NichechainError(
+                f"a {name} draws elites from an archive that the search does not add to: it must be the "
+                "archive or the result archive of the scheduler"
+            )
 
 
 def centre(emitter: Any) -> NDArray[Any]:

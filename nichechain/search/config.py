@@ -18,6 +18,7 @@ from nichechain.core.checks import (
     plain_options,
 )
 from nichechain.core.errors import NichechainError
+from nichechain.niches.grid import EPSILON
 
 Replacement = Literal["random", "first", "newest", "objective"]
 Outside = Literal["state", "absorb", "clip"]
@@ -117,6 +118,8 @@ class BuildConfig(SearchConfig):
         Bounds of the niches along each axis, in units of behavior.
     niches : {"grid", "cvt"}
         Equal cells, or a Voronoi tessellation, see :class:`nichechain.niches.CVTNiches`.
+    epsilon : float
+        Of a grid, see :class:`nichechain.niches.GridNiches`.
     domain_options : mapping of str to str, int, float or bool
         What else :func:`nichechain.domains.make` is told of the domain.
 
@@ -130,6 +133,7 @@ class BuildConfig(SearchConfig):
     bounds: tuple[tuple[float, float], ...]
     _: KW_ONLY
     niches: NichesKind = "grid"
+    epsilon: float = EPSILON
     domain_options: Mapping[str, DomainOption] = field(default_factory=dict, hash=False)
 
     def __post_init__(self) -> None:
@@ -179,8 +183,11 @@ class BuildConfig(SearchConfig):
         check_choice("selection", self.selection, get_args(Selection))
 
     def to_json(self) -> dict[str, Any]:
-        """Plain values for JSON."""
-        return asdict(self)
+        """Plain values for JSON; as before grids had an epsilon, where it is the usual one."""
+        values = asdict(self)
+        if self.epsilon == EPSILON:
+            del values["epsilon"]
+        return values
 
     @classmethod
     def from_json(cls, values: dict[str, Any]) -> BuildConfig:

@@ -55,7 +55,7 @@ def make_niches(config: BuildConfig, centroids: Floats | None = None) -> Niches:
         If the configuration's values, or the centroids, do not fit together.
     """
     if config.niches == "grid":
-        return GridNiches(config.shape, config.bounds, config.outside)
+        return GridNiches(config.shape, config.bounds, config.outside, config.epsilon)
     if centroids is None:
         return CVTNiches.tessellated(
             config.shape[0], config.bounds, seed=config.niches_seed, outside=config.outside

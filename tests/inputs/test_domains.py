@@ -51,6 +51,7 @@ CALLS = (
             "shape": ((3,), (0, 2), (-1, 2), (), (2.5, 2), ("a", 2), 3, "3x2", None, (10**6, 10**6)),
             "bounds": _BAD_BOUNDS,
             "outside": UNKNOWN,
+            "epsilon": (-1e-6, float("inf"), *NOT_A_NUMBER),
         },
     ),
     Call("niches.GridNiches.of", lambda w: {"self": w.niches, "behavior": [[0, 0]]}, {"behavior": _BEHAVIOR}),

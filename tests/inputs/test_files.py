@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import nichechain as nc
 from nichechain.archive.imported import Axes, Columns
 
 from .table import (
@@ -258,7 +259,15 @@ CALLS = (
     Call(
         "pyribs.record",
         lambda w: {"scheduler": w.scheduler()},
-        {"outside": UNKNOWN, "strategy_parent": UNKNOWN},
+        {
+            "scheduler": (*UNKNOWN, Made(lambda w: w.scheduler().archive, "an archive")),
+            "niches": (
+                *UNKNOWN,
+                Made(lambda w: nc.GridNiches((4,), ((0, 1),)), "one axis"),
+            ),
+            "outside": UNKNOWN,
+            "strategy_parent": UNKNOWN,
+        },
     ),
     Call(
         "pyribs.MutationEmitter",

@@ -14,10 +14,10 @@ from nichechain.archive.imported import Axes
 from nichechain.cli import main
 from nichechain.domains import PlanarArm
 from nichechain.niches import CVTNiches, GridNiches
-from nichechain.pyribs import from_ribs, record, to_ribs
+from nichechain.pyribs import Recording, from_ribs, record, to_ribs
 from nichechain.search.parents import curiosity
 
-from .searches import RANGES, cvt, grid, run, search
+from .searches import RANGES, cvt, evaluate, grid, run, search
 
 INITIAL = np.random.default_rng(2).uniform(-1.5, 1.5, (40, 5))
 
@@ -123,8 +123,11 @@ def test_there_and_back_keeps_the_elites(make, tmp_path):
 
 
 def test_a_finished_archive_has_elites_and_no_parents(tmp_path):
-    source = recorded(grid()).archive
-    archive = from_ribs(source, tmp_path / "archive")
+    recording = recorded(grid())
+    source = recording.archive
+    recording.stop()
+    with pytest.warns(UserWarning, match="has its elites and not whom they came from, so T cannot"):
+        archive = from_ribs(source, tmp_path / "archive")
     assert archive.niches == GridNiches((7, 6), tuple(RANGES), "clip")
     assert archive.meta.births == archive.filled == len(source)
     assert archive.counts.births.sum() == 0
@@ -168,12 +171,54 @@ def test_a_tessellation_is_drawn_by_pyribs(tmp_path):
     assert ax.collections or ax.patches
 
 
+def unrecorded():
+    archive = grid()
+    return search(archive, GaussianEmitter(archive, sigma=0.1, initial_solutions=INITIAL))
+
+
+def test_what_is_being_recorded_stands_for_its_recording_and_may_be_written_again(tmp_path):
+    scheduler = unrecorded()
+    recording = record(scheduler)
+    run(scheduler, 4)
+    first = from_ribs(scheduler, tmp_path / "archive")
+    assert first.meta.births == len(recording)
+    run(scheduler, 1)
+    again = from_ribs(scheduler.archive, tmp_path / "archive", overwrite=True)
+    assert again.meta.births == len(recording) == first.meta.births + 64
+    nc.build(
+        nc.BuildConfig("arm", (3, 3), PlanarArm.bounds, evaluations=50, initial=50),
+        tmp_path / "b",
+        nc.Threads(1),
+    )
+    with pytest.raises(ArchiveError, match="was not imported, which is not overwritten"):
+        from_ribs(recording, tmp_path / "b", overwrite=True)
+    assert nc.load(tmp_path / "b").meta.births == 50
+
+
+def test_lost_parents_are_no_secret(tmp_path, capsys):
+    archive = grid()
+    with Recording(archive) as recording:
+        for batch in range(4):
+            archive.sample_elites(3) if batch else None
+            archive.add(INITIAL + batch / 10, *evaluate(INITIAL + batch / 10))
+    with pytest.warns(UserWarning, match="none of 120 births after the first batch has a known parent"):
+        found = from_ribs(recording, tmp_path / "archive")
+    with pytest.warns(UserWarning, match="none of 120 births after the first batch"):
+        found.chain()
+    assert main(["info", str(found.folder)]) == 0
+    assert "none of 120 births after the first batch has a known parent" in " ".join(
+        capsys.readouterr().out.split()
+    )
+
+
 def test_what_cannot_be_converted_is_named(made, tmp_path):
     recording, archive = made
     with pytest.raises(ArchiveError, match="already holds an archive"):
         from_ribs(recording, archive.folder)
     with pytest.raises(NichechainError, match="there are no births yet"):
         from_ribs(grid(), tmp_path / "a")
+    with pytest.raises(NichechainError, match="source is a Scheduler that is not being recorded"):
+        from_ribs(unrecorded(), tmp_path / "a")
     with pytest.raises(NichechainError, match="axes are x, y, z, but the grid has 2"):
         from_ribs(recording, tmp_path / "b", axes=Axes(("x", "y", "z")))
     with pytest.raises(NichechainError, match="the archive is a list"):

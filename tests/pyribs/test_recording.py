@@ -6,6 +6,12 @@ import pickle
 
 import numpy as np
 import pytest
+from ribs.archives import (
+    CategoricalArchive,
+    DensityArchive,
+    ProximityArchive,
+    SlidingBoundariesArchive,
+)
 from ribs.emitters import (
     EvolutionStrategyEmitter,
     GaussianEmitter,
@@ -16,9 +22,11 @@ from ribs.emitters import (
 from ribs.schedulers import BanditScheduler, Scheduler
 
 from nichechain import NichechainError, variation
-from nichechain.pyribs import MutationEmitter, Recording, record
+from nichechain.niches import GridNiches
+from nichechain.pyribs import MutationEmitter, Recording, from_ribs, record
+from nichechain.pyribs.recording import recording_of
 
-from .searches import cvt, evaluate, grid, run, search
+from .searches import RANGES, cvt, evaluate, grid, run, search
 
 INITIAL = np.random.default_rng(2).uniform(-1.5, 1.5, (40, 5))
 TINY = 1e-9
@@ -75,7 +83,7 @@ def check_table(frame, archive):
 
 
 def recorded_elites(archive):
-    return archive.add.__self__.elites()[1].tolist()
+    return recording_of(archive).elites()[1].tolist()
 
 
 @pytest.mark.parametrize("emitter", [gaussian, iso_line, genetic, genetic_line, ours])
@@ -410,12 +418,187 @@ def test_emitters_whose_parents_are_not_known_are_refused(make, message):
         scheduler.ask()
 
 
-def test_what_cannot_be_recorded_is_named():
-    from ribs.archives import SlidingBoundariesArchive
+NICHES = GridNiches((6, 5), tuple(RANGES))
 
-    sliding = SlidingBoundariesArchive(solution_dim=5, dims=(4, 4), ranges=[(-1, 1), (-1, 1)])
-    with pytest.raises(NichechainError, match="the archive is a SlidingBoundariesArchive, but must be"):
-        Recording(sliding, [])
+
+def sliding():
+    return SlidingBoundariesArchive(solution_dim=5, dims=(4, 4), ranges=RANGES, remap_frequency=30, seed=1)
+
+
+@pytest.mark.parametrize(
+    ("archive", "message"),
+    [
+        (sliding, "a SlidingBoundariesArchive moves its cells while it searches.*give niches, such as"),
+        (
+            lambda: CategoricalArchive(solution_dim=5, categories=[["a", "b"], ["c", "d"]]),
+            "the measures of a CategoricalArchive are words.*number the categories",
+        ),
+        (
+            lambda: ProximityArchive(solution_dim=5, measure_dim=2, k_neighbors=3, novelty_threshold=0.1),
+            "a ProximityArchive has no cells that could be niches: give the scheduler a GridArchive",
+        ),
+        (
+            lambda: DensityArchive(measure_dim=2, bandwidth=1.0),
+            "a DensityArchive has no cells that could be niches",
+        ),
+        (list, "the archive is a list, but must be a GridArchive or a CVTArchive of pyribs"),
+    ],
+)
+def test_archives_without_lasting_cells_are_refused_with_what_to_do(archive, message):
+    with pytest.raises(NichechainError, match=message):
+        Recording(archive())
+
+
+def test_an_archive_that_moves_its_cells_is_recorded_in_given_niches():
+    archive = sliding()
+    scheduler = search(archive, gaussian(archive))
+    recording = record(scheduler, niches=NICHES)
+    solutions = run(scheduler, 8)
+    births = recording.births().to_pandas()
+    np.testing.assert_array_equal(births["child_niche"], NICHES.of(evaluate(solutions)[1]))
+    children = births["parent_uid"].notna()
+    assert children.sum() == 7 * 20
+    parents = solutions[births["parent_uid"][children].astype(int)]
+    assert np.abs(solutions[children] - parents).max() < 100 * TINY
+
+
+@pytest.mark.parametrize("add_mode", ["batch", "single"])
+def test_solutions_that_are_clipped_in_place_keep_their_parents(add_mode):
+    archive = grid()
+    scheduler = search(archive, gaussian(archive), add_mode=add_mode)
+    recording = record(scheduler)
+    added = []
+    for _ in range(6):
+        solutions = scheduler.ask()
+        np.clip(solutions, -0.5, 0.5, out=solutions)
+        added.append(solutions.copy())
+        scheduler.tell(*evaluate(solutions))
+    solutions = np.concatenate(added)
+    births = recording.births().to_pandas()
+    children = births["parent_uid"].notna()
+    assert children.sum() == 5 * 20
+    parents = solutions[births["parent_uid"][children].astype(int)]
+    assert np.abs(solutions[children] - parents).max() < 100 * TINY
+
+
+def test_solutions_that_were_changed_and_shuffled_have_no_parents():
+    archive = grid()
+    emitter = gaussian(archive)
+    recording = Recording(archive, [emitter])
+    for seed in range(3):
+        solutions = emitter.ask()
+        solutions[0] += 0.5
+        solutions = np.random.default_rng(seed).permutation(solutions)
+        archive.add(solutions, *evaluate(solutions))
+    births = recording.births().to_pandas()
+    assert births["parent_uid"][40:].isna().sum() == 2
+
+
+@pytest.mark.parametrize("make", [grid, cvt])
+@pytest.mark.parametrize("how", ["elites", "cells"])
+def test_a_loop_of_ones_own_says_who_the_parents_are(make, how):
+    archive = make()
+    rng = np.random.default_rng(0)
+    added = [INITIAL]
+    with Recording(archive) as recording:
+        archive.add(INITIAL, *evaluate(INITIAL))
+        for _ in range(5):
+            elites = archive.sample_elites(15)
+            recording.parents(elites if how == "elites" else elites["index"])
+            solutions = elites["solution"] + rng.normal(0, TINY, (15, 5))
+            added.append(solutions)
+            for some in (slice(0, 9), slice(9, 15)):
+                archive.add(solutions[some], *evaluate(solutions[some]))
+    archive.add(INITIAL + 0.1, *evaluate(INITIAL + 0.1))
+    solutions = np.concatenate(added)
+    births = recording.births().to_pandas()
+    assert len(births) == len(solutions) == 40 + 75
+    assert births["step"].tolist() == [0] * 40 + sorted(list(range(1, 6)) * 15)
+    children = births["parent_uid"].notna()
+    assert children.sum() == 75
+    parents = solutions[births["parent_uid"][children].astype(int)]
+    assert np.abs(solutions[children] - parents).max() < 100 * TINY
+    assert recording_of(archive) is None
+    assert "add" not in vars(archive)
+
+
+def test_parents_of_a_loop_of_ones_own_are_elites_and_as_many_as_children():
+    archive = grid()
+    with Recording(archive) as recording:
+        archive.add(INITIAL, *evaluate(INITIAL))
+        empty = int(np.setdiff1d(np.arange(42), archive.data("index"))[0])
+        with pytest.raises(NichechainError, match="parent 1 is no elite that was recorded"):
+            recording.parents([int(archive.data("index")[0]), empty])
+        with pytest.raises(NichechainError, match=r"parents has the value 0\.5, but must have whole numbers"):
+            recording.parents([0.5])
+        recording.parents(archive.sample_elites(2))
+        before = archive.data()
+        with pytest.raises(NichechainError, match=r"3 solutions are added, but parents\(\) named 2 parents"):
+            archive.add(np.zeros((3, 5)), *evaluate(np.zeros((3, 5))))
+        np.testing.assert_array_equal(archive.data("objective"), before["objective"])
+    assert len(recording) == 40
+
+
+def test_a_recording_is_got_back_from_its_scheduler():
+    archive = grid()
+    scheduler = search(archive, gaussian(archive, 0.3))
+    recording = record(scheduler)
+    assert record(scheduler) is recording
+    run(scheduler, 3)
+    copied = pickle.loads(pickle.dumps(scheduler))
+    back = record(copied)
+    assert back is not recording
+    assert back.births().equals(recording.births())
+    run(copied, 2)
+    assert len(back) == len(recording) + 40
+    with pytest.raises(
+        NichechainError, match="outside is 'clip', but the scheduler is being recorded already"
+    ):
+        record(copied, outside="clip")
+    back.stop()
+    assert record(copied, outside="clip").niches.outside == "clip"
+
+
+def test_an_archive_is_no_scheduler():
+    with pytest.raises(
+        NichechainError, match=r"scheduler is a GridArchive, but must be a Scheduler .*Recording\(archive\)"
+    ):
+        record(grid())
+
+
+def test_an_emitter_draws_from_an_archive_of_the_search():
+    with pytest.raises(NichechainError, match="draws elites from an archive that the search does not add to"):
+        record(search(grid(), gaussian(grid())))
+
+
+def test_niches_that_do_not_fit_are_refused():
+    archive = grid()
+    with pytest.raises(NichechainError, match="niches are 'grid', but must be niches of nichechain"):
+        Recording(archive, niches="grid")
+    with pytest.raises(NichechainError, match="niches have 1 axes, but the archive has 2 measures"):
+        Recording(archive, niches=GridNiches((4,), ((0, 1),)))
+
+
+def test_a_grid_keeps_its_epsilon(tmp_path):
+    archive = grid(epsilon=0.05)
+    with Recording(archive) as recording:
+        archive.add(INITIAL, *evaluate(INITIAL))
+    edges = np.linspace(-1, 1, 2001)
+    measures = np.stack([edges, edges * 0.8], axis=1)
+    np.testing.assert_array_equal(recording.niches.of(measures), archive.index_of(measures))
+    assert (Recording(grid()).niches.of(measures) != archive.index_of(measures)).any()
+    with pytest.warns(UserWarning, match="none of 40 births has a known parent"):
+        found = from_ribs(recording, tmp_path / "archive")
+    assert found.niches == recording.niches
+    assert found.to_ribs().epsilon == 0.05
+
+
+def test_an_epsilon_is_the_same_in_short_floats():
+    assert Recording(grid(dtype=np.float32)).niches.epsilon == GridNiches((7, 6), tuple(RANGES)).epsilon
+    assert Recording(grid(dtype=np.float32, epsilon=0.05)).niches.epsilon == 0.05
+
+
+def test_what_cannot_be_recorded_is_named():
     archive = grid()
     Recording(archive, [])
     with pytest.raises(NichechainError, match="recorded already"):
