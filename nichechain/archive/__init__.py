@@ -14,7 +14,8 @@ from nichechain.archive.exports import (
     write_stn,
 )
 from nichechain.archive.filling import BuildProgress
-from nichechain.archive.imported import Axes, Columns, import_births
+from nichechain.archive.imported import Axes, import_births
+from nichechain.archive.log_columns import Columns
 from nichechain.archive.merge import merge
 
 __all__ = [

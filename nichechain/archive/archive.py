@@ -22,6 +22,7 @@ from nichechain.core.errors import ArchiveError, NichechainError
 from nichechain.core.notebook import facts_table
 from nichechain.domains.base import Domain
 from nichechain.niches import Niche, Niches
+from nichechain.niches.plain import ATTRIBUTE, to_plain
 from nichechain.search.config import BuildConfig
 from nichechain.search.elites import Elites
 from nichechain.search.making import make_domain, make_mutation
@@ -188,10 +189,15 @@ class Archive:
         return to_ribs(self)
 
     def births(self) -> pd.DataFrame:
-        """Every evaluated child, in order; the columns of :mod:`nichechain.births.table`."""
+        """Every evaluated child, in order; the columns of :mod:`nichechain.births.table`.
+
+        The frame knows its niches: ``TransitionCounts.from_births(archive.births())`` needs no more.
+        """
         frame = read.read_births(self.folder, self.meta).to_pandas(use_threads=False, types_mapper=_nullable)
         names = {f"behavior_{i}": f"behavior_{name}" for i, name in enumerate(self.meta.facts.behavior_names)}
-        return frame.rename(columns=names)
+        frame = frame.rename(columns=names)
+        frame.attrs[ATTRIBUTE] = to_plain(self.niches)
+        return frame
 
     @cached_property
     def orphan_note(self) -> str | None:

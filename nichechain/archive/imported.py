@@ -2,74 +2,26 @@
 
 from __future__ import annotations
 
-import hashlib
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.compute as pc
-from numpy.typing import ArrayLike, NDArray
 
-from nichechain import births
 from nichechain.archive import read, write
-from nichechain.births.joins import repeated
-from nichechain.births.table import NONE
+from nichechain.archive.log_columns import Columns, LogReader
+from nichechain.archive.logs import read_log
 from nichechain.core.errors import ArchiveError, NichechainError
 from nichechain.core.files import writing
-from nichechain.core.parquet import read_parquet
 from nichechain.niches import Niches
 from nichechain.search.config import BuildConfig
 from nichechain.search.elites import Elites, SearchState
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+if TYPE_CHECKING:
+    import pandas as pd
 
 DOMAIN = "imported"
-_UNKNOWN = "the log has no child"
-
-
-@dataclass(frozen=True)
-class Columns:
-    """Which columns of a log are what.
-
-    Parameters
-    ----------
-    parent, child : str or tuple of str
-        One name: states by their number, the niches of the grid in C order and then the outside
-        state. A tuple of names: behavior, one column for each axis of the grid. A null or NaN
-        parent is that of an initial birth, such a child failed.
-    run : str, optional
-        What tells runs apart: whole numbers or words, renumbered in sorted order.
-    uid : str, optional
-        Number of the child within its run; by default births are numbered in the order of the log.
-    elite : str, optional
-        Number of the parent within its run, which tells siblings from cousins.
-    step : str, optional
-        Step of the search.
-    lineage : str, optional
-        True or 1 where the parent was not selected but is the latest birth of a lineage; by default
-        nowhere.
-    """
-
-    parent: str | tuple[str, ...] = "parent_niche"
-    child: str | tuple[str, ...] = "child_niche"
-    run: str | None = None
-    uid: str | None = None
-    elite: str | None = None
-    step: str | None = None
-    lineage: str | None = None
-
-    @property
-    def names(self) -> list[str]:
-        """All columns that are read."""
-        of_states = [
-            [given] if isinstance(given, str) else list(given) for given in (self.parent, self.child)
-        ]
-        given = (self.run, self.uid, self.elite, self.step, self.lineage)
-        others = [name for name in given if name is not None]
-        return list(dict.fromkeys([*of_states[0], *of_states[1], *others]))
 
 
 @dataclass(frozen=True)
@@ -88,12 +40,13 @@ class Axes:
 
 
 def import_births(
-    log: str | Path,
+    log: str | Path | pd.DataFrame | pa.Table,
     folder: str | Path,
     niches: Niches,
     *,
     columns: Columns | None = None,
     axes: Axes | None = None,
+    overwrite: bool = False,
 ) -> None:
     """Make an archive of the births that a log of another search tells of.
 
@@ -102,45 +55,52 @@ def import_births(
 
     Parameters
     ----------
-    log : path
-        A CSV file with a header, or Parquet; one row per evaluated child.
+    log : path, pandas.DataFrame or pyarrow.Table
+        One row per evaluated child: a CSV file with a header, plain or gzipped; Parquet, or a folder of
+        such files, read in the order of their names; or a table.
     folder : path
-        Where the archive goes; it must not hold one.
+        Where the archive goes.
     niches : Niches
     columns : Columns, optional
     axes : Axes, optional
+    overwrite : bool
+        Whether an archive that the folder holds may go, if its births were imported as well.
 
     Raises
     ------
     NichechainError
         If the log cannot be read, a column is missing or holds what it must not.
     ArchiveError
-        If the folder holds an archive.
+        If the folder holds an archive that must stay.
     """
     columns, axes = columns or Columns(), axes or Axes()
-    try:
-        content = Path(log).read_bytes()
-    except OSError as error:
-        raise NichechainError(f"{log} cannot be read: {error.strerror}") from error
-    table = _read(Path(log), content)
-    missing = [name for name in columns.names if name not in table.column_names]
+    table, source = read_log(log)
+    name = source["file"] if hasattr(log, "columns") else log
+    missing = [each for each in columns.names if each not in table.column_names]
     if missing:
-        raise NichechainError(f"{log} has no column {missing[0]!r}: it has {', '.join(table.column_names)}")
-    twice = [name for name in columns.names if table.column_names.count(name) > 1]
+        raise NichechainError(f"{name} has no column {missing[0]!r}: it has {', '.join(table.column_names)}")
+    twice = [each for each in columns.names if table.column_names.count(each) > 1]
     if twice:
-        raise NichechainError(f"{log} has column {twice[0]!r} more than once: rename all but one")
+        raise NichechainError(f"{name} has column {twice[0]!r} more than once: rename all but one")
     if not len(table):
-        raise NichechainError(f"{log} has no rows, but every birth is one")
-    if not (axes.names or isinstance(columns.child, str)):
+        raise NichechainError(f"{name} has no rows, but every birth is one")
+    if not (axes.names or isinstance(columns.child, str)) and len(columns.child) == len(niches.bounds):
         axes = replace(axes, names=columns.child)
-    rows = _Reader(table, niches).births(columns)
+    rows = LogReader(table, niches).births(columns)
     origin = {
         "kind": "imported",
-        "file": Path(log).name,
-        "sha256": hashlib.sha256(content).hexdigest(),
+        **source,
         "columns": {name: value for name, value in vars(columns).items() if value is not None},
     }
-    write_archive(folder, niches, rows, origin, axes)
+    write_archive(
+        folder,
+        niches,
+        rows,
+        origin,
+        axes,
+        objective_name=columns.objective or "objective",
+        overwrite=overwrite,
+    )
 
 
 def write_archive(
@@ -210,26 +170,6 @@ def _clear(folder: Path, overwrite: bool) -> None:
     write.clear(folder)
 
 
-def _read(log: Path, content: bytes) -> pa.Table:
-    import pyarrow.csv
-
-    kind = log.suffix.lower()
-    if kind not in (".csv", ".parquet"):
-        raise NichechainError(f"{log} is neither a .csv nor a .parquet file, which are what can be imported")
-    try:
-        if kind == ".parquet":
-            return read_parquet(pa.BufferReader(content))
-        # The reader has a thread in any case, which must not be the last to hold Python's bytes.
-        own = pa.BufferOutputStream()
-        own.write(content)
-        return pyarrow.csv.read_csv(
-            pa.BufferReader(own.getvalue()), pyarrow.csv.ReadOptions(use_threads=False)
-        )
-    except pa.ArrowException as error:
-        reason = str(error).splitlines()[0]
-        raise NichechainError(f"{log} cannot be read as {kind[1:].upper()}: {reason}") from error
-
-
 def _axis_names(axes: Axes, dimensions: int) -> tuple[str, ...]:
     if axes.names:
         if len(axes.names) != dimensions:
@@ -243,181 +183,3 @@ def _nothing_to_go_on_with(number: int, dimensions: int) -> SearchState:
     none = np.empty((0, 0), np.float32)
     elites = Elites(whole, none, np.empty((0, dimensions)), real, real, whole, whole)
     return SearchState.at_rest(elites, number, 0)
-
-
-@dataclass(frozen=True)
-class _Reader:
-    """Reads columns of a log, and says in which row something is wrong."""
-
-    table: pa.Table
-    niches: Niches
-
-    def births(self, columns: Columns) -> pa.Table:
-        """The rows as births."""
-        size, dimensions = len(self.table), len(self.niches.bounds)
-        parent, _ = self._states(columns.parent, whole=True)
-        child, behavior = self._states(columns.child)
-        run = self._runs(columns.run)
-        uid = self._whole(columns.uid, lowest=0) if columns.uid else _within_runs(run)
-        elite = self._whole(columns.elite, lowest=0, nulls=True) if columns.elite else np.full(size, NONE)
-        step = self._whole(columns.step, lowest=0, nulls=True) if columns.step else np.full(size, NONE)
-        if columns.uid:
-            _check_unique(run, uid, columns.uid)
-        lost = (parent != NONE) & (elite == NONE) if columns.elite else np.zeros(size, bool)
-        if lost.any():
-            raise NichechainError(
-                f"row {_row(lost)} has a parent's niche but no {columns.elite}: "
-                "leave the column out, or fill it"
-            )
-        lineage = self._yes(columns.lineage) if columns.lineage else np.zeros(size, bool)
-        orphan = lineage & (parent == NONE)
-        if orphan.any():
-            raise NichechainError(
-                f"row {_row(orphan)} has {columns.lineage} but no parent, which every birth of a lineage has"
-            )
-        gone = child == NONE
-        nothing = pa.nulls(size)
-        failed = np.where(gone, _UNKNOWN, "")
-        arrays = [
-            run,
-            uid,
-            pa.array(elite, mask=(elite == NONE) | (parent == NONE)),
-            # How many generations lie behind a birth, and who was accepted, a log does not say.
-            nothing,
-            pa.array(parent, mask=parent == NONE),
-            pa.array(child, mask=gone),
-            *(
-                nothing if behavior is None else pa.array(behavior[:, axis], mask=gone)
-                for axis in range(dimensions)
-            ),
-            nothing,
-            nothing,
-            pa.array(failed, pa.string(), mask=~gone),
-            pa.array(step, mask=step == NONE),
-            lineage,
-        ]
-        schema = births.schema(dimensions)
-        try:
-            cast = [pa.array(array).cast(kind.type) for array, kind in zip(arrays, schema, strict=True)]
-        except pa.ArrowInvalid as error:
-            raise NichechainError(f"a number is too large to be imported: {error}") from error
-        return pa.Table.from_arrays(cast, schema=schema)
-
-    def _states(self, given: str | tuple[str, ...], *, whole: bool = False) -> tuple[Ints, Floats | None]:
-        """States, and behavior where that is what is given; ``whole`` ones have all of it or none."""
-        if isinstance(given, str):
-            state = self._whole(given, lowest=0, nulls=True)
-            odd = state >= self.niches.states
-            if odd.any():
-                at = _row(odd)
-                raise NichechainError(
-                    f"row {at} has {given} {state[at - 1]}, but states run from 0 to {self.niches.states - 1}"
-                )
-            return state, None
-        axes = len(self.niches.bounds)
-        if len(given) != axes:
-            raise NichechainError(f"behavior has columns {', '.join(given)}, but the grid has {axes} axes")
-        behavior = np.stack([self._numbers(name) for name in given], axis=1)
-        missing = np.isnan(behavior)
-        half = missing.any(axis=1) & ~missing.all(axis=1)
-        # A parent without any is that of an initial birth; half a behavior is a mistake.
-        if whole and half.any():
-            raise NichechainError(f"row {_row(half)} has only some of {', '.join(given)}: give all or none")
-        known = ~missing.any(axis=1)
-        state = np.full(len(behavior), NONE, np.int64)
-        endless = known & np.isinf(behavior).any(axis=1)
-        if endless.any():
-            raise NichechainError(f"row {_row(endless)} has an infinite behavior, which belongs to no niche")
-        narrow = all(pa.types.is_float32(self.table[name].type) for name in given)
-        state[known] = self.niches.of(behavior[known].astype(np.float32 if narrow else np.float64))
-        return state, behavior
-
-    def _numbers(self, name: str) -> Floats:
-        column = self.table[name]
-        if not (
-            pa.types.is_integer(column.type)
-            or pa.types.is_floating(column.type)
-            or column.null_count == len(column)
-        ):
-            raise NichechainError(f"column {name!r} has values of type {column.type}, but must have numbers")
-        numbers: Floats = column.cast(pa.float64()).fill_null(np.nan).to_numpy().astype(np.float64)
-        return numbers
-
-    def _whole(self, name: str, *, lowest: int, nulls: bool = False) -> Ints:
-        column = self.table[name]
-        # Numbers beyond 2**53 would not survive being floating-point.
-        if pa.types.is_integer(column.type) and not column.null_count:
-            if pa.types.is_uint64(column.type) and (pc.max(column).as_py() or 0) >= 2**63:
-                raise NichechainError(f"{name} has {pc.max(column)}, but a whole number is less than 2**63")
-            whole: Ints = column.to_numpy().astype(np.int64)
-            none = np.zeros(whole.size, bool)
-        else:
-            values = self._numbers(name)
-            none = np.isnan(values)
-            odd = ~none & ~((values == np.floor(values)) & (np.abs(values) < 2.0**63))
-            if odd.any():
-                raise NichechainError(
-                    f"row {_row(odd)} has {name} {values[odd][0]:g}, but must have a whole number below 2**63"
-                )
-            whole = np.where(none, NONE, values).astype(np.int64)
-        low = ~none & (whole < lowest)
-        if low.any():
-            raise NichechainError(f"row {_row(low)} has {name} {whole[low][0]}, but must not be negative")
-        if none.any() and not nulls:
-            raise NichechainError(f"row {_row(none)} has no {name}, but every birth must have one")
-        return whole
-
-    def _yes(self, name: str) -> NDArray[np.bool_]:
-        column = self.table[name]
-        if pa.types.is_boolean(column.type):
-            said: NDArray[np.bool_] = column.fill_null(False).to_numpy().astype(bool)
-            return said
-        number = self._whole(name, lowest=0, nulls=True)
-        odd = number > 1
-        if odd.any():
-            raise NichechainError(
-                f"row {_row(odd)} has {name} {number[odd][0]}, but must have true or false, or 1 or 0"
-            )
-        one: NDArray[np.bool_] = number == 1
-        return one
-
-    def _runs(self, name: str | None) -> Ints:
-        if name is None:
-            return np.zeros(len(self.table), np.int64)
-        column = self.table[name]
-        if column.null_count:
-            raise NichechainError(
-                f"row {_row(column.is_null().to_numpy())} has no {name}, but every birth must have one"
-            )
-        if pa.types.is_nested(column.type):
-            raise NichechainError(f"column {name!r} has values of type {column.type}, but must name runs")
-        if pa.types.is_floating(column.type) and pc.any(pc.is_nan(column)).as_py():
-            odd = pc.is_nan(column).to_numpy()
-            raise NichechainError(f"row {_row(odd)} has no {name}, but every birth must have one")
-        known = column.combine_chunks().dictionary_encode()
-        # Numbers in the order of the runs' names, not of their first rows.
-        order = np.argsort(pc.array_sort_indices(known.dictionary).to_numpy())
-        run: Ints = order[known.indices.to_numpy()].astype(np.int64)
-        return run
-
-
-def _within_runs(run: Ints) -> Ints:
-    """Numbers from 0 within each run."""
-    order = np.argsort(run, kind="stable")
-    births = np.bincount(run)
-    uid = np.empty_like(run)
-    uid[order] = np.arange(run.size) - np.repeat(np.cumsum(births) - births, births)
-    return uid
-
-
-def _check_unique(run: Ints, uid: Ints, name: str) -> None:
-    again = repeated(run, uid)
-    if again.any():
-        raise NichechainError(
-            f"row {_row(again)} has {name} {uid[again][0]} again, but births of a run differ in it"
-        )
-
-
-def _row(odd: ArrayLike) -> int:
-    """Number of the first odd row, the first being row 1."""
-    return int(np.argmax(odd)) + 1

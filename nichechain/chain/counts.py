@@ -16,6 +16,7 @@ from nichechain.births.table import NONE
 from nichechain.core.checks import as_floats, as_whole
 from nichechain.core.errors import NichechainError
 from nichechain.niches import Niches
+from nichechain.niches.plain import ATTRIBUTE, from_plain
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -54,7 +55,7 @@ class TransitionCounts:
     @overload
     @classmethod
     def from_births(
-        cls, parent: pd.DataFrame | pa.Table, child: Niches, *, elite: None = None
+        cls, parent: pd.DataFrame | pa.Table, child: Niches | None = None, *, elite: None = None
     ) -> TransitionCounts: ...
 
     @overload
@@ -65,7 +66,7 @@ class TransitionCounts:
 
     @classmethod
     def from_births(
-        cls, parent: Any, child: Any, niches: Niches | None = None, *, elite: ArrayLike | None = None
+        cls, parent: Any, child: Any = None, niches: Niches | None = None, *, elite: ArrayLike | None = None
     ) -> TransitionCounts:
         """Counts of births: of their columns, or of a table as in ``from_births(births, niches)``.
 
@@ -75,7 +76,8 @@ class TransitionCounts:
             States of the parent and of the child, null or -1 where there is none: a birth without a
             parent is only a visit, and one without a niche failed and is left out. Or, in the place of
             ``parent``, a DataFrame or pyarrow.Table with the columns of :mod:`nichechain.births.table`,
-            such as ``archive.births()``, and the niches in the place of ``child``.
+            and the niches in the place of ``child``: not even those for ``archive.births()`` and what is
+            selected of its rows, which know them.
         niches : Niches
             The niches that the numbers belong to.
         elite : (N,) ints, optional
@@ -87,13 +89,15 @@ class TransitionCounts:
             If the lengths differ, a state does not exist or a column is missing.
         """
         if hasattr(parent, "columns"):
+            if child is None and ATTRIBUTE in getattr(parent, "attrs", {}):
+                child = from_plain(parent.attrs[ATTRIBUTE])
             if not isinstance(child, Niches) or niches is not None or elite is not None:
                 raise NichechainError(
                     "a table of births comes with its niches alone: from_births(births, niches)"
                 )
             return cls._from_table(parent, child)
-        if niches is None:
-            raise NichechainError("niches are missing: from_births(parent, child, niches)")
+        if child is None or niches is None:
+            raise NichechainError("child or niches are missing: from_births(parent, child, niches)")
         i, j = _states("parent", parent), _states("child", child)
         _check_pairs(i, j, niches, lowest=NONE)
         moved = (i != NONE) & (j != NONE)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from nichechain.niches.base import OUTSIDE, OUTSIDE_MODES, Niche, Niches, one_hot
+from nichechain.niches.centroids import read_centroids
 from nichechain.niches.cvt import CVTNiches
 from nichechain.niches.grid import GridNiches
 from nichechain.niches.parsing import parse_bounds, parse_niche, parse_niches, parse_shape
@@ -19,4 +20,5 @@ __all__ = [
     "parse_niche",
     "parse_niches",
     "parse_shape",
+    "read_centroids",
 ]

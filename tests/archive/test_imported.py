@@ -2,10 +2,11 @@
 
 import numpy as np
 import pandas as pd
+import pyarrow as pa
 import pytest
 
 import nichechain as nc
-from nichechain.archive.imported import Axes, Columns, import_births
+from nichechain.archive import Axes, Columns, import_births
 from nichechain.core.errors import ArchiveError, NichechainError
 
 GRID = nc.GridNiches((4, 3), ((-1.0, 1.0), (-1.0, 1.0)))
@@ -83,6 +84,111 @@ def test_runs_are_told_apart_whatever_they_are_called(tmp_path):
     assert archive.counts_of(run=0).visits.sum() == 2
 
 
+FRAME = pd.DataFrame(
+    {"parent_niche": [-1, 0, 0, 1], "child_niche": [1, 2, 3, 12], "worth": [0.5, 1, None, 3]}
+)
+WORTH = Columns(objective="worth")
+
+
+def _as_csv_gz(folder):
+    FRAME.to_csv(folder / "log.csv.gz", index=False)
+    return folder / "log.csv.gz"
+
+
+def _as_folder(folder):
+    for number, rows in enumerate((FRAME[:1], FRAME[1:3], FRAME[3:])):
+        (folder / "log").mkdir(exist_ok=True)
+        rows.to_parquet(folder / "log" / f"part-{number}.parquet")
+    return folder / "log"
+
+
+def _as_table(folder):
+    del folder
+    return pa.Table.from_pandas(FRAME)
+
+
+@pytest.mark.parametrize("given", [_as_csv_gz, _as_folder, _as_table, lambda _: FRAME])
+def test_a_log_may_be_zipped_in_pieces_or_a_table(given, tmp_path):
+    import_births(given(tmp_path), tmp_path / "in", GRID, columns=WORTH)
+    archive = nc.load(tmp_path / "in")
+    births = archive.births()
+    # No parent is null or -1.
+    assert births["parent_niche"].isna().tolist() == [True, False, False, False]
+    assert births["child_niche"].tolist() == [1, 2, 3, 12]
+    assert births["objective"].fillna(-1).tolist() == [0.5, 1, -1, 3]
+    assert archive.meta.facts.objective_name == "worth"
+    assert len(archive.meta.origin["sha256"]) == 64
+
+
+def test_no_parent_may_be_minus_one_as_a_number_too(tmp_path):
+    frame = FRAME.assign(elite=[-1, 0, 0, 1])
+    import_births(frame, tmp_path / "in", GRID, columns=Columns(elite="elite"))
+    assert nc.load(tmp_path / "in").births()["parent_uid"].fillna(-1).tolist() == [-1, 0, 0, 1]
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize("fixed", [True, False])
+def test_behavior_in_a_column_of_lists(tmp_path, dtype, fixed):
+    behavior = np.random.default_rng(0).uniform(-1.2, 1.2, (20, 2)).astype(dtype)
+    rows = [*behavior.tolist()[:-1], None]
+    value = pa.from_numpy_dtype(dtype)
+    column = pa.array(rows, pa.list_(value, 2) if fixed else pa.list_(value))
+    table = pa.table({"parent": pa.array([None, *[3] * 19]), "descriptor": column})
+    import_births(table, tmp_path / "in", GRID, columns=Columns("parent", ("descriptor",)))
+    archive = nc.load(tmp_path / "in")
+    births = archive.births()
+    assert births["child_niche"][:-1].tolist() == GRID.of(behavior[:-1]).tolist()
+    assert births["failed"][19] == "the log has no child"
+    np.testing.assert_array_equal(births[["behavior_axis_0", "behavior_axis_1"]][:-1], behavior[:-1])
+
+
+def test_lists_have_a_number_for_each_axis(tmp_path):
+    table = pa.table({"parent": [0, 1], "d": [[0.1, 0.2], [0.1, 0.2, 0.3]]})
+    with pytest.raises(NichechainError, match="row 2 has 3 numbers in d, but must have 2, one for each axis"):
+        import_births(table, tmp_path / "in", GRID, columns=Columns("parent", ("d",)))
+
+
+def test_what_was_imported_may_be_replaced_and_nothing_else(arm, tmp_path):
+    import_births(FRAME, tmp_path / "in", GRID)
+    import_births(FRAME[:2], tmp_path / "in", GRID, overwrite=True)
+    assert nc.load(tmp_path / "in").meta.births == 2
+    with pytest.raises(NichechainError, match="no column 'gone'"):
+        import_births(FRAME, tmp_path / "in", GRID, columns=Columns("gone"), overwrite=True)
+    assert nc.load(tmp_path / "in").meta.births == 2
+    with pytest.raises(ArchiveError, match="was not imported, which is not overwritten"):
+        import_births(FRAME, arm.folder, GRID, overwrite=True)
+    assert nc.load(arm.folder).meta.births == 400
+
+
+def test_pieces_that_do_not_belong_together_are_named(tmp_path):
+    folder = _as_folder(tmp_path)
+    pd.DataFrame({"parent_niche": ["a"], "child_niche": [1]}).to_parquet(folder / "part-9.parquet")
+    with pytest.raises(NichechainError, match="has files that do not belong together"):
+        import_births(folder, tmp_path / "in", GRID)
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(NichechainError, match=r"is a folder without a \.parquet file"):
+        import_births(tmp_path / "empty", tmp_path / "in", GRID)
+
+
+@pytest.mark.parametrize("niches", [GRID, nc.CVTNiches.tessellated(9, GRID.bounds, outside="clip")])
+def test_births_know_their_niches(niches, tmp_path):
+    frame = pd.DataFrame({"parent_niche": [None, 0, 0, 1], "child_niche": [1, 2, 3, 8], "step": [0, 1, 1, 2]})
+    import_births(frame, tmp_path / "in", niches, columns=Columns(step="step"))
+    archive = nc.load(tmp_path / "in")
+    births = archive.births()
+    counts = nc.TransitionCounts.from_births(births)
+    assert counts.niches == niches
+    assert (counts.matrix != archive.counts.matrix).nnz == 0
+    np.testing.assert_array_equal(counts.visits, archive.counts.visits)
+    assert nc.TransitionCounts.from_births(births[births["step"] == 1]).births.sum() == 2
+    # A frame that is written and read again knows them too.
+    births.to_parquet(tmp_path / "births.parquet")
+    assert nc.TransitionCounts.from_births(pd.read_parquet(tmp_path / "births.parquet")).niches == niches
+    births.attrs.clear()
+    with pytest.raises(NichechainError, match="a table of births comes with its niches alone"):
+        nc.TransitionCounts.from_births(births)
+
+
 def test_what_an_imported_archive_cannot_do(tmp_path):
     frame = pd.DataFrame({"parent_niche": [0, 0], "child_niche": [1, 2]})
     log = written(frame, tmp_path / "log.csv")
@@ -132,7 +238,7 @@ def test_bad_logs(tmp_path, values, columns, said):
 @pytest.mark.parametrize(
     ("name", "content", "said"),
     [
-        ("log.txt", b"", "neither a .csv nor a .parquet"),
+        ("log.txt", b"", "neither a .csv, .csv.gz or .parquet file"),
         ("log.parquet", b"abc", "cannot be read as PARQUET"),
         ("log.csv", b"", "cannot be read as CSV"),
         ("log.csv", b"parent_niche,child_niche\n", "has no rows"),

@@ -1,5 +1,7 @@
 import json
 
+import numpy as np
+import pandas as pd
 import pytest
 
 import nichechain as nc
@@ -67,8 +69,39 @@ def test_bad_options_are_one_sentence(log, tmp_path, capsys, options, said):
     assert not (tmp_path / "in").exists()
 
 
+@pytest.mark.parametrize("kind", ["npy", "csv", "txt", "parquet"])
+def test_niches_around_centroids_of_a_file(log, tmp_path, kind):
+    centroids = np.random.default_rng(0).uniform(-1, 1, (12, 2))
+    file = tmp_path / f"centroids.{kind}"
+    match kind:
+        case "npy":
+            np.save(file, centroids)
+        case "parquet":
+            pd.DataFrame(centroids, columns=["x", "y"]).to_parquet(file)
+        case "csv":
+            pd.DataFrame(centroids, columns=["x", "y"]).to_csv(file, index=False)
+        case _:
+            np.savetxt(file, centroids)
+    behavior = ["--child-behavior", "behavior_x,behavior_y", "--parent-behavior", "behavior_x,behavior_y"]
+    command = ["import", str(log), "--niches", str(file), "--bounds=-1,1,-1,1", "--out", str(tmp_path / "in")]
+    assert main([*command, *behavior, "--objective", "objective"]) == 0
+    archive = nc.load(tmp_path / "in")
+    assert archive.niches == nc.CVTNiches(centroids, ((-1, 1), (-1, 1)))
+    frame = pd.read_csv(log)
+    np.testing.assert_array_equal(archive.births()["objective"], frame["objective"])
+    assert main([*command, *behavior]) == 2
+    assert main([*command, *behavior, "--force"]) == 0
+
+
+def test_niches_are_given_once(log, tmp_path, capsys):
+    assert imported(log, tmp_path / "in", "--niches", "c.npy") == 2
+    assert "either the cells of --grid or around the centroids of --niches" in capsys.readouterr().err
+    assert main(["import", str(log), "--bounds=0,1,0,1", "--out", str(tmp_path / "in")]) == 2
+    assert "either the cells of --grid" in capsys.readouterr().err
+
+
 def test_no_such_log(tmp_path, capsys):
     assert imported(tmp_path / "no.csv", tmp_path / "in") == 2
     assert "No such file" in capsys.readouterr().err
     assert imported(__file__, tmp_path / "in") == 2
-    assert "neither a .csv nor a .parquet file" in capsys.readouterr().err
+    assert "neither a .csv, .csv.gz or .parquet file" in capsys.readouterr().err

@@ -144,7 +144,7 @@ _CALLED = {
     "name": "(mutation|metric|domain|measure|study)",
     "number": "niche",
     "output": "activation",
-    "path": "(folder|archive)",
+    "path": "(file|folder|archive)",
     "probability": "archive_probability",
     "size": "(step_bound|elites)",
     "state": "niche",

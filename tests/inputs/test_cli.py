@@ -203,11 +203,13 @@ TABLE: tuple[tuple[str, str, tuple[str, ...], Bad], ...] = (
         {
             "log": ("/no/such/log.csv", "{archive}/meta.json", "{archive}"),
             "grid": _GRID,
+            "niches": ("{log}",),
             "bounds": _BOUNDS,
             "out": ("{archive}",),
             "outside": _UNKNOWN,
             **dict.fromkeys(
                 (
+                    "objective",
                     "parent",
                     "child",
                     "run",

@@ -18,6 +18,7 @@ from .table import (
     SEED,
     UNKNOWN,
     Call,
+    Made,
     World,
     check_accepted,
     check_refused,
@@ -26,6 +27,14 @@ from .table import (
 )
 
 _BOX = ((0.0, 1.0), (0.0, 2.0))
+
+
+def _file(world: World, name: str, text: str) -> Any:
+    path = world.folder / name
+    path.write_text(text)
+    return path
+
+
 _BAD_BOUNDS = (
     ((0.0, 1.0),),
     ((0.0, 0.0), (0.0, 1.0)),
@@ -52,6 +61,24 @@ CALLS = (
             "bounds": _BAD_BOUNDS,
             "outside": UNKNOWN,
             "epsilon": (-1e-6, float("inf"), *NOT_A_NUMBER),
+        },
+    ),
+    Call(
+        "niches.read_centroids",
+        lambda w: {"path": _file(w, "good.csv", "0.1,0.2\n0.3,0.4\n")},
+        {
+            "path": (
+                "/no/such/file.csv",
+                *(
+                    Made(lambda w, name=name, text=text: _file(w, name, text), name)
+                    for name, text in (
+                        ("a.json", "[]"),
+                        ("b.csv", "x\na,b\n"),
+                        ("c.npy", "no"),
+                        ("d.txt", ""),
+                    )
+                ),
+            )
         },
     ),
     Call("niches.GridNiches.of", lambda w: {"self": w.niches, "behavior": [[0, 0]]}, {"behavior": _BEHAVIOR}),

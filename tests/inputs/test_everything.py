@@ -185,8 +185,8 @@ EXEMPT: dict[tuple[str, str], str] = {
         ("archive.archive.Archive", "folder", "a Path that load, which is tried, has looked at"),
         ("archive.imported.Axes", "names unit", _TEXT),
         (
-            "archive.imported.Columns",
-            "parent child run uid elite step lineage",
+            "archive.log_columns.Columns",
+            "parent child run uid elite step lineage objective",
             "names of columns, which import_births looks for",
         ),
         ("search.config.BuildConfig", "domain outside mutation epsilon", _LATER),

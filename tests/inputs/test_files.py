@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import nichechain as nc
-from nichechain.archive.imported import Axes, Columns
+from nichechain.archive import Axes, Columns
 
 from .table import (
     LINEAGES,
@@ -176,6 +176,10 @@ CALLS = (
                 _written("half.csv", "parent_niche,child_niche\n0.5,1\n"),
                 _written("huge.csv", "parent_niche,child_niche\n99,1\n"),
                 _written("bad.parquet", "PAR1"),
+                _written("bad.csv.gz", "no"),
+                3,
+                Made(lambda w: w.folder, "no-parquet"),
+                Made(lambda w: w.births.drop(columns=["child_niche"]), "no-child"),
             ),
             "folder": (Made(lambda w: w.archive.folder, "an-archive"),),
             "columns": (

@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 
 import nichechain as nc
-from nichechain.archive import write
+from nichechain.archive import Columns, import_births, write
 from nichechain.archive.exports import write_stn
-from nichechain.archive.imported import Columns, import_births
 from nichechain.archive.merge import merge
 from nichechain.cli import main
 from nichechain.core.errors import ArchiveError, NichechainError

@@ -8,7 +8,7 @@ import pytest
 from matplotlib.figure import Figure
 
 import nichechain as nc
-from nichechain.archive.imported import Columns, import_births
+from nichechain.archive import Columns, import_births
 from nichechain.chain.structure import stationary_distribution
 from nichechain.cli import sweep as command
 from nichechain.cli.sweep import parse_sizes

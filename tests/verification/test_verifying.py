@@ -570,7 +570,7 @@ def test_a_domain_of_another_length_is_not_verified(genuine: Archive) -> None:
 
 
 def test_imported_births_are_verified_as_far_as_they_go(tmp_path: Path) -> None:
-    from nichechain.archive.imported import Columns, import_births
+    from nichechain.archive import Columns, import_births
     from nichechain.niches import GridNiches
 
     (tmp_path / "log.csv").write_text("px,py,x,y\n,,0.1,0.2\n0.1,0.2,0.5,-0.5\n0.1,0.2,,\n")
