@@ -26,10 +26,14 @@ class ExploreCommand:
     """Lineages U that it shows first."""
     estimator: parsing.EstimatorName = "empirical-bayes"
     """How T is estimated."""
-    draws: int = 20
-    """Posterior draws of T behind the intervals."""
+    draws: int | None = None
+    """Posterior draws of T behind numbers and intervals. (default: 50, and 6 for over 1,000 niches)"""
     seed: int = 0
     """Seed of the draws."""
+    films: Path | None = None
+    """Folder of what `nichechain watch` made, shown with the elites: 14,14.gif and so on."""
+    beside: parsing.ArchivePath | None = None
+    """A second archive to show beside the first."""
 
 
 def run(arguments: Sequence[str]) -> int:
@@ -41,6 +45,7 @@ def run(arguments: Sequence[str]) -> int:
     from nichechain.plots.explorer import write_explorer
 
     archive = load(command.path)
+    other = None if command.beside is None else load(command.beside)
     with progress.spinner("computing intervals over posterior draws"):
         write_explorer(
             archive,
@@ -50,6 +55,8 @@ def run(arguments: Sequence[str]) -> int:
             lineages=command.lineages,
             draws=command.draws,
             seed=command.seed,
+            films=command.films,
+            beside=None if other is None else (other, other.chain(command.estimator)),
         )
     size = command.out.stat().st_size
     output.console().print(f"wrote {command.out} ({size / 1e6:.1f} MB): open it in a browser")

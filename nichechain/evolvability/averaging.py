@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nichechain.chain.model import NicheChain, Transition
+from nichechain.core.intervals import drawn_interval
 from nichechain.core.randomness import Purpose, keyed
 from nichechain.evolvability.coverage import expected_coverage, sampled_coverage
 from nichechain.evolvability.question import Question
@@ -18,7 +19,6 @@ from nichechain.evolvability.results import Evolvability
 Floats = NDArray[np.float64]
 Sample: TypeAlias = tuple[Transition, Floats]
 
-_INTERVAL = (0.05, 0.95)
 # Lineages without end: what they visit in expectation is all that can be visited.
 ENDLESS = 10**9
 SATURATED = 0.95
@@ -68,7 +68,7 @@ def standard_error(sampled: NDArray[np.int64]) -> float:
 def summary(means: Floats, errors: Floats) -> tuple[Floats, Floats, Floats, Floats]:
     """Mean over the draws along axis 0, its standard error, and the interval."""
     size = len(means)
-    low, high = np.quantile(means, _INTERVAL, axis=0, method="weibull")
+    low, high = drawn_interval(means)
     if size == 1:
         return means[0], errors[0], low, high
     # The spread of the draws' means already has the simulations' error in it.

@@ -11,6 +11,7 @@ from scipy import sparse
 
 from nichechain.chain.model import NicheChain, Transition
 from nichechain.chain.operator import PooledTransition
+from nichechain.core.intervals import drawn_interval
 from nichechain.evolvability.coverage import at_least_once, visit_probabilities
 from nichechain.evolvability.question import DRAWS, Convention, Question, Root
 from nichechain.evolvability.returns import return_probabilities
@@ -131,7 +132,7 @@ def reach(
         visits.append(visit[:n])
         descendants.append(lineages * passes[:n])
         some.extend(at_least_once(visit[:n], [lineages]))
-    low, high = np.quantile(some, (0.05, 0.95), axis=0, method="weibull")
+    low, high = drawn_interval(some)
     return Reach(
         np.mean(visits, axis=0),
         np.mean(some, axis=0),

@@ -22,6 +22,7 @@ from nichechain.chain.model import NicheChain
 from nichechain.chain.posterior import DirichletPosterior
 from nichechain.core.checks import check_at_least, check_numbers
 from nichechain.core.errors import NichechainError
+from nichechain.core.intervals import drawn_interval
 from nichechain.core.randomness import Purpose, keyed
 from nichechain.evolvability.niches import answer_for_niches
 from nichechain.evolvability.question import DRAWS, Convention, Question
@@ -30,8 +31,6 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 BandKind = Literal["prior sensitivity", "bootstrap over elites"]
-
-_INTERVAL = (0.05, 0.95)
 
 
 @dataclass(frozen=True)
@@ -187,7 +186,8 @@ def bootstrap_elites(
     again = np.array(
         [again_with(rng) for rng in (keyed(seed, Purpose.RESAMPLING, number) for number in range(resamples))]
     )
-    low, high = value + np.quantile(again, _INTERVAL, axis=0, method="weibull") - np.median(again, axis=0)
+    ends = drawn_interval(again)
+    low, high = (value + end - np.median(again, axis=0) for end in ends)
     niches = len(counts.niches)
     return NicheBand("bootstrap over elites", value, np.maximum(low, 0.0), np.minimum(high, niches))
 

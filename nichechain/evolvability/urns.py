@@ -17,6 +17,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from nichechain.core.intervals import drawn_interval
 from nichechain.core.randomness import Purpose, keyed
 
 if TYPE_CHECKING:
@@ -73,7 +74,7 @@ class Simulated:
         together = 1.0 - noise.mean() / max(spread.mean(), 1e-300)
         least = max(0.5 * together, 0.5 * math.sqrt(2.0 / (len(drawn) - 1)), 0.0)
         kept = np.sqrt(np.clip(own, min(least, 1.0), 1.0))
-        low, high = np.quantile(drawn, (0.05, 0.95), axis=0, method="weibull")
+        low, high = drawn_interval(drawn)
         return mean, np.sqrt(spread / len(drawn)), mean + kept * (low - mean), mean + kept * (high - mean)
 
 
@@ -121,7 +122,7 @@ def simulated_coverage(
     noise = np.empty_like(coverage)
     for draw in range(question.draws):
         rng = keyed(question.seed, Purpose.WALKS, draw)
-        urns = _Urns(posterior.settled(keyed(question.seed, Purpose.POSTERIOR, draw)))
+        urns = Urns(posterior.settled(keyed(question.seed, Purpose.POSTERIOR, draw)))
         for start in range(0, m, at_once):
             block = slice(start, min(start + at_once, m))
             if roots is None:
@@ -138,7 +139,7 @@ def simulated_coverage(
     return Simulated(coverage, noise)
 
 
-class _Urns:
+class Urns:
     """Rows of T as urns."""
 
     def __init__(self, posterior: DirichletPosterior) -> None:
@@ -240,12 +241,15 @@ def _resolve(origin: Any, fresh: Any, states: Any, done: Any) -> None:
 def _covered(states: Ints, lineages: int, sizes: list[int], niches: int) -> tuple[Floats, Floats]:
     """Niches visited by U of M lineages, and its variance as two halves tell it: (g, k) each."""
     half = lineages // 2
-    tables = [np.stack([_hit(whole, size) for size in sizes]) for whole in (lineages, half, lineages - half)]
+    tables = [
+        np.stack([hit_probabilities(whole, size) for size in sizes])
+        for whole in (lineages, half, lineages - half)
+    ]
     whole, first, second = _count(states, lineages, half, niches, *tables)
     return whole, (first - second) ** 2 / 4.0
 
 
-def _hit(lineages: int, size: int) -> Floats:
+def hit_probabilities(lineages: int, size: int) -> Floats:
     """P(one of c among M is among U drawn without replacement), for c from 0 to M."""
     missed = np.arange(lineages)
     left = np.maximum(lineages - size - missed, 0) / (lineages - missed)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from nichechain.chain.model import NicheChain
 from nichechain.core.checks import check_at_least
 from nichechain.core.errors import NichechainError
+from nichechain.core.intervals import drawn_interval
 from nichechain.evolvability.averaging import ENDLESS, SATURATED
 from nichechain.evolvability.coverage import coverage_by_generation
 from nichechain.evolvability.question import Question
@@ -133,7 +134,7 @@ def _lines(
     for number in range(len(niches)):
         here = values[:, number]
         mean = here.mean(axis=0)
-        low, high = np.quantile(here, (0.05, 0.95), axis=0, method="weibull")
+        low, high = drawn_interval(here)
         saturated = np.median(here / endless[:, number], axis=0) > SATURATED
         hollows |= bool(saturated.any())
         color, marker = _COLORS[number], _MARKERS[number]

@@ -17,6 +17,7 @@ from scipy import stats
 
 from nichechain.births.table import NONE
 from nichechain.chain.model import NicheChain
+from nichechain.core.intervals import drawn_interval
 from nichechain.core.randomness import Purpose, keyed
 from nichechain.core.row_sampler import RowSampler
 from nichechain.evolvability.coverage import expected_coverage, rarefied_coverage
@@ -32,8 +33,6 @@ Ints = NDArray[np.int64]
 DRAWS = 50
 # Simulations of the whole check on each draw of T.
 _REPLICAS = 8
-# Quantiles of a 90 % interval.
-_INTERVAL = (0.05, 0.95)
 
 
 @dataclass(frozen=True)
@@ -58,8 +57,7 @@ class Prediction:
     @property
     def interval(self) -> tuple[Floats, Floats]:
         """90 % interval of the number that this many lineages reach, (R, l) each."""
-        low, high = np.quantile(self.simulated, _INTERVAL, axis=2)
-        return low, high
+        return drawn_interval(self.simulated, axis=2)
 
 
 @dataclass(frozen=True)
@@ -103,6 +101,7 @@ class DirectCheck:
             for k in range(self.reached.shape[1]):
                 real, value = self.reached[:, k], prediction.value[:, k]
                 ideal = _spearmans(prediction.simulated[:, k], value)
+                spearman_low, spearman_high = drawn_interval(ideal)
                 bias = value - real
                 width = stats.t.ppf(0.975, bias.size - 1) * bias.std(ddof=1) / np.sqrt(bias.size)
                 rows.append(
@@ -113,8 +112,8 @@ class DirectCheck:
                         "predicted": value.mean(),
                         "spearman": float(_spearmans(real[:, None], value)[0]),
                         "spearman_expected": np.median(ideal),
-                        "spearman_low": np.quantile(ideal, _INTERVAL[0]),
-                        "spearman_high": np.quantile(ideal, _INTERVAL[1]),
+                        "spearman_low": spearman_low,
+                        "spearman_high": spearman_high,
                         "bias": bias.mean(),
                         "bias_low": bias.mean() - width,
                         "bias_high": bias.mean() + width,

@@ -192,6 +192,8 @@ TABLE: tuple[tuple[str, str, tuple[str, ...], Bad], ...] = (
             "path": _PATH,
             "out": ("/no/such/folder/page.html", "{archive}"),
             "draws": _COUNT,
+            "films": ("/no/such/folder", "{archive}/meta.json"),
+            "beside": _PATH,
             **_SCORES,
             **_ESTIMATOR,
         },

@@ -222,7 +222,7 @@ EXEMPT: dict[tuple[str, str], str] = {
         ("studies.running.run", "folder", _LATER),
         ("studies.study.Study", "domain domain_options", _LATER),
         ("landscape.archives.measure_archive", "keep", _LATER),
-        ("plots.explorer.write_explorer", "out", _LATER),
+        ("plots.explorer.page.write_explorer", "out", _LATER),
         (
             "pyribs.recording.Recording",
             "emitters outside strategy_parent",

@@ -90,9 +90,16 @@ CALLS = (
         {"records": _EMPTY, "step": (-1, 99, "last"), "conditions": _WALKS["conditions"]},
     ),
     Call(
-        "plots.write_explorer",
+        "plots.explorer.page.write_explorer",
         lambda w: {"archive": w.archive, "chain": w.chain, "out": w.fresh(), "draws": 1},
-        {**LINEAGES, "l": (10_000, *whole(0)), "lineages": (10**9, *whole(0)), "draws": whole(0)},
+        {
+            **LINEAGES,
+            "l": (10_000, *whole(0)),
+            "lineages": (10**9, *whole(0)),
+            "draws": whole(0),
+            "films": ("/no/such/folder",),
+            "beside": (1, ("one",)),
+        },
     ),
 )
 

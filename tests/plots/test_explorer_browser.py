@@ -1,13 +1,17 @@
 """The page as a browser runs it."""
 
+import io
 import shutil
+from xml.etree import ElementTree
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import nichechain as nc
-from nichechain.evolvability.coverage import expected_coverage, visit_probabilities
-from nichechain.plots.explorer import rounded_transition, write_explorer
+from nichechain.evolvability.coverage import visit_probabilities
+from nichechain.plots.explorer import write_explorer
+from nichechain.plots.explorer.transitions import rounded_transition
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 DRIVER = shutil.which("chromedriver")
@@ -101,7 +105,7 @@ def reached(browser, niche):
 def test_page_computes_what_the_library_does(chromium, pages, archive, estimator):
     chromium.get(pages[estimator])
     chain = archive.chain(estimator)
-    transition = rounded_transition(chain).toarray()
+    transition = rounded_transition(chain)[0].toarray()
     n = len(archive.niches)
     found = np.stack([reached(chromium, niche) for niche in range(n)], axis=1)
     assert found.shape == (10, n, chain.states)
@@ -112,12 +116,10 @@ def test_page_computes_what_the_library_does(chromium, pages, archive, estimator
     # What is embedded is rounded to single precision; the library's own T is not.
     exact = np.hstack([h for _, h in visit_probabilities(chain.T, chain.T[:n], 5)])
     np.testing.assert_allclose(found[4], exact, atol=1e-6)
-    for lineages in (1, 50, 10_000):
-        covered = chromium.execute_script(
-            "return explorer.coverage(explorer.visitProbabilities(20)[3], arguments[0])", lineages
-        )
-        expected = expected_coverage(transition, transition[[20]], 4, lineages, counted=n)[0]
-        assert covered == pytest.approx(expected, rel=1e-10)
+    column = chromium.execute_script(
+        "return Array.from({length: explorer.data.states}, (_, i) => explorer.entry(i, 20))"
+    )
+    np.testing.assert_allclose(column, transition[:, 20], atol=1e-12)
 
 
 def test_click_shows_the_niche(browser, archive):
@@ -132,24 +134,127 @@ def test_click_shows_the_niche(browser, archive):
     assert births[3] == str(archive.counts.births[elite.state])
     scores = nc.niche_evolvability(archive.chain(), l=4, lineages=50, draws=3)
     value, low, high = (getattr(scores, name)[elite.state] for name in ("value", "low", "high"))
-    assert text(browser, "interval") == f"{value:.1f} ({low:.1f} to {high:.1f})"
-    chain = archive.chain()
-    plug_in = expected_coverage(chain.T, chain.T[[elite.state]], 4, 50, counted=len(archive.niches))[0]
-    assert text(browser, "plug-in") == f"{plug_in:.1f}"
-    assert text(browser, "plug-in-title") == "plug-in"
+    assert text(browser, "value") == f"{value:.1f}"
+    assert text(browser, "interval") == f"90 % interval {low:.1f} to {high:.1f}"
 
 
-def test_sliders_count_again(browser, archive):
+def test_every_stop_has_an_interval(browser, archive):
     rectangle(browser, archive, (3, 4)).click()
-    state = archive.niches.flat((3, 4))
-    chain = archive.chain()
-    for l in (1, 9):
+    state, chain = archive.niches.flat((3, 4)), archive.chain()
+    for l, stop, lineages in ((1, 7, 50), (9, 7, 50), (9, 0, 1), (10, 12, 1000)):
         slide(browser, "l", l)
-        expected = expected_coverage(chain.T, chain.T[[state]], l, 50, counted=len(archive.niches))[0]
-        assert text(browser, "plug-in") == f"{expected:.1f}"
-    slide(browser, "u", 0)
-    assert text(browser, "u-value") == "1"
-    assert text(browser, "interval") == "not for U = 1"
+        slide(browser, "u", stop)
+        assert text(browser, "u-value") == str(lineages)
+        found = nc.niche_evolvability(chain, l=l, lineages=lineages, draws=3)
+        value, low, high = (getattr(found, name)[state] for name in ("value", "low", "high"))
+        assert text(browser, "value") == f"{value:.1f}"
+        assert text(browser, "interval") == f"90 % interval {low:.1f} to {high:.1f}"
+
+
+def test_map_is_coloured_by_the_number_that_is_shown(browser, archive):
+    rectangle(browser, archive, (3, 4)).click()
+    slide(browser, "colour", "evolvability")
+    scores = nc.niche_evolvability(archive.chain(), l=4, lineages=50, draws=3).value
+    known = archive.counts.births[: len(archive.niches)] > 0
+    most = int(np.argmax(np.where(known, scores, -1.0)))
+    fill = browser.find_element("css selector", f'[data-niche="{most}"]').value_of_css_property("fill")
+    assert fill == "rgb(253, 231, 37)"
+
+
+def test_who_leads_here(browser, archive):
+    state = int(np.argmax(archive.counts.visits[:54]))
+    rectangle(browser, archive, archive.niches.index(state)).click()
+    slide(browser, "arrows", "in")
+    enough = archive.counts.births >= 20
+    enough[state] = False
+    column = np.where(enough, archive.chain().T[:, state], -1.0)
+    strongest = np.argsort(-column)[: min(8, int(enough.sum()))]
+    best = int(strongest[0])
+    first = browser.find_elements("css selector", "#incoming tr")[1].text
+    assert first.startswith(f"{archive.niches.label(best)} {100 * column[best]:.1f} % ")
+    assert len(browser.find_elements("css selector", "#overlay polygon")) == int((strongest < 54).sum())
+
+
+def test_lineage_is_a_path_over_the_map(browser, archive):
+    deepest = int(archive.elites.niche[np.argmax(archive.elites.depth)])
+    rectangle(browser, archive, archive.niches.index(deepest)).click()
+    slide(browser, "arrows", "lineage")
+    states = browser.execute_script("return explorer.lineage(arguments[0])", deepest)
+    assert len(states) == archive.elite(deepest).depth + 1
+    assert states[-1] == deepest
+    circles = browser.find_elements("css selector", "#overlay circle")
+    assert len(circles) == sum(place < len(archive.niches) for place in states)
+
+
+def test_two_archives_side_by_side(chromium, archive, tmp_path):
+    from selenium.webdriver.support.ui import WebDriverWait
+
+    out = tmp_path / "both.html"
+    chain = archive.chain()
+    write_explorer(archive, chain, out, draws=2, beside=(archive, archive.chain("mle")))
+    chromium.get(out.as_uri())
+    frames = chromium.find_elements("css selector", "iframe")
+    assert len(frames) == 2
+
+    def in_frame(frame, what):
+        chromium.switch_to.frame(frame)
+        found = what()
+        chromium.switch_to.default_content()
+        return found
+
+    wait = WebDriverWait(chromium, 20)
+    wait.until(lambda _: all(in_frame(frame, lambda: text(chromium, "niche")) for frame in frames))
+    in_frame(frames[1], lambda: rectangle(chromium, archive, (4, 5)).click())
+    in_frame(frames[1], lambda: slide(chromium, "l", 8))
+    for frame in frames:
+        wait.until(lambda _, frame=frame: in_frame(frame, lambda: text(chromium, "niche")) == "Niche 4,5")
+        wait.until(lambda _, frame=frame: in_frame(frame, lambda: text(chromium, "l-value")) == "8")
+    scales = {in_frame(frame, lambda: text(chromium, "legend").split("never")[0]) for frame in frames}
+    assert len(scales) == 1
+    assert chromium.get_log("browser") == []
+
+
+def test_niche_by_name(browser):
+    from selenium.webdriver import Keys
+
+    box = browser.find_element("id", "go")
+    box.clear()
+    box.send_keys("4 7", Keys.ENTER)
+    assert text(browser, "niche") == "Niche 4,7"
+    box.clear()
+    box.send_keys("77,1", Keys.ENTER)
+    assert text(browser, "niche") == "Niche 4,7"
+    assert "go up to 5,8" in box.get_attribute("validationMessage")
+
+
+def test_births_so_far(browser, archive):
+    slide(browser, "colour", "visits")
+    slide(browser, "stage", 6)
+    births = archive.births().head(315)["child_niche"]
+    births = births[births < 54]
+    assert text(browser, "stage-value") == "315"
+    for niche in (int(births.iloc[5]), int(births.iloc[20])):
+        cell = browser.find_element("css selector", f'[data-niche="{niche}"]')
+        assert cell.value_of_css_property("fill") != "rgb(236, 236, 236)"
+    later = int(np.flatnonzero((archive.counts.visits[:54] > 0) & ~np.isin(np.arange(54), births))[0])
+    grey = browser.find_element("css selector", f'[data-niche="{later}"]').value_of_css_property("fill")
+    assert grey in ("rgb(236, 236, 236)", "rgb(38, 43, 48)")
+
+
+def test_table_and_picture_can_be_saved(browser, archive):
+    table = pd.read_csv(io.StringIO(browser.execute_script("return explorer.tableOfNiches()")))
+    assert len(table) == len(archive.niches)
+    found = nc.niche_evolvability(archive.chain(), l=4, lineages=50, draws=3)
+    np.testing.assert_allclose(table["niches_reached"], found.value, atol=2e-3)
+    np.testing.assert_allclose(table["low"], found.low, atol=2e-3)
+    assert (table["births"] == archive.counts.visits[:54]).all()
+    assert table["niche"][10] == archive.niches.label(10)
+    picture = browser.execute_script("return explorer.picture()")
+    drawn = ElementTree.fromstring(picture["text"])
+    assert len(drawn.findall(".//*[@data-niche]")) == len(archive.niches)
+    assert "var(" not in picture["text"].split("<g", 1)[1].replace("--", "")
+    for name in ("save-picture", "save-table"):
+        browser.find_element("id", name).click()
 
 
 def test_strongest_transitions(browser, archive):
@@ -196,6 +301,7 @@ def test_zoom_and_pan(browser, archive):
     from selenium.webdriver import ActionChains
 
     cell = rectangle(browser, archive, (2, 4))
+    cell.click()
     before = cell.rect["width"]
     browser.find_element("id", "zoom-in").click()
     assert cell.rect["width"] == pytest.approx(1.5 * before, rel=0.02)
@@ -204,6 +310,12 @@ def test_zoom_and_pan(browser, archive):
     ActionChains(browser).move_to_element(cell).click_and_hold().move_by_offset(0, 30).release().perform()
     assert cell.rect["y"] == pytest.approx(at + 30, abs=1)
     assert text(browser, "niche") == heading
+    for _ in range(6):
+        browser.find_element("id", "zoom-in").click()
+    box = browser.find_element("css selector", ".chosen").rect
+    chart = browser.find_element("id", "chart").rect
+    assert chart["x"] <= box["x"] <= chart["x"] + chart["width"]
+    assert chart["y"] <= box["y"] <= chart["y"] + chart["height"]
     browser.find_element("id", "zoom-all").click()
     assert cell.rect["width"] == pytest.approx(before, rel=0.01)
 
@@ -214,7 +326,7 @@ def test_colours_and_theme(browser, archive):
     for option in browser.find_elements("css selector", "#colour option"):
         slide(browser, "colour", option.get_attribute("value"))
         seen.add((cell.value_of_css_property("fill"), text(browser, "legend").split("\n")[0]))
-    assert len({words for _, words in seen}) == 8
+    assert len({words for _, words in seen}) == 9
     paper = browser.find_element("tag name", "body").value_of_css_property("background-color")
     browser.find_element("id", "theme").click()
     assert browser.find_element("tag name", "body").value_of_css_property("background-color") != paper

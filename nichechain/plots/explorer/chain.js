@@ -4,7 +4,8 @@
 
 const data = JSON.parse(document.getElementById("data").textContent);
 const unpack = (text, Kind) => new Kind(Uint8Array.from(atob(text), (c) => c.charCodeAt(0)).buffer);
-const [columns, rows] = data.shape;
+// A grid has columns and rows; other niches are Voronoi cells around their centres.
+const [columns, rows] = data.shape || [0, 0];
 const n = data.niches;
 const S = data.states;
 const LONGEST = 10;
@@ -27,19 +28,42 @@ const counts = {
 const visits = unpack(data.visits, Uint32Array);
 const children = unpack(data.children, Uint32Array);
 const elites = unpack(data.elites, Float64Array);
-const scores = unpack(data.scores, Float32Array);
+const scoreScale = unpack(data.scoreScale, Float32Array);
+const scores = unpack(data.scores, Uint16Array);
+const past = {
+  visits: unpack(data.visitsAt, Uint32Array),
+  children: unpack(data.childrenAt, Uint32Array),
+  first: unpack(data.firstBirth, Uint32Array),
+  parent: unpack(data.ancestorParent, Int32Array),
+  niche: unpack(data.ancestorNiche, Uint16Array),
+  elite: unpack(data.eliteBirth, Int32Array),
+};
+const centers = unpack(data.centers, Float64Array);
+const corners = data.shape ? null : { start: unpack(data.cornerStart, Uint32Array), at: unpack(data.corners, Float32Array) };
 const wormholes = new Map((data.wormholes || []).map(([i, j, p]) => [i * S + j, p]));
 const [[left, right], [bottom, top]] = data.bounds;
-const cell = [(right - left) / columns, (top - bottom) / rows];
+// Width and height of a cell, on average where cells differ.
+const cell = data.shape
+  ? [(right - left) / columns, (top - bottom) / rows]
+  : [(right - left) / Math.sqrt(n), (top - bottom) / Math.sqrt(n)];
 const far = data.longJump * Math.hypot(right - left, top - bottom);
 
 const elite = (field, niche) => elites[field * n + niche];
 const index = (niche) => [Math.floor(niche / rows), niche % rows];
-const label = (state) => (state < n ? index(state).join(",") : "outside");
-const center = (niche) => {
+const label = (state) => (state >= n ? "outside" : data.shape ? index(state).join(",") : String(state));
+const center = (niche) => [centers[2 * niche], centers[2 * niche + 1]];
+
+/** The corners of a niche's cell. */
+function outline(niche) {
+  if (corners) {
+    const found = [];
+    for (let k = corners.start[niche]; k < corners.start[niche + 1]; k++) found.push([corners.at[2 * k], corners.at[2 * k + 1]]);
+    return found;
+  }
   const [i, j] = index(niche);
-  return [left + (i + 0.5) * cell[0], bottom + (j + 0.5) * cell[1]];
-};
+  const [x, y] = [left + i * cell[0], bottom + j * cell[1]];
+  return [[x, y], [x + cell[0], y], [x + cell[0], y + cell[1]], [x, y + cell[1]]];
+}
 const distance = (a, b) => Math.hypot(center(a)[0] - center(b)[0], center(a)[1] - center(b)[1]);
 
 /* The chain. */
@@ -68,6 +92,19 @@ function advance(here) {
     }
   }
   return there;
+}
+
+/** T_ij, whose parts are added up. */
+function entry(i, j) {
+  const pools = T.pools.length / S;
+  let found = 0;
+  for (let pool = 0; pool < pools; pool++) found += T.shares[i * pools + pool] * T.pools[pool * S + j];
+  for (let k = T.start[i]; k < T.start[i + 1]; k++) if (T.column[k] === j) found += T.probability[k];
+  if (T.spread[i] && j < n) {
+    const [[x, y], [column, line]] = [index(i), index(j)];
+    found += T.spread[i] * T.kernel[(column - x + columns - 1) * (2 * rows - 1) + rows - 1 - y + line];
+  }
+  return found;
 }
 
 /** A row of T. */
@@ -101,14 +138,16 @@ function visitProbabilities(root) {
 
 /** Probability that at least one of U lineages does what one does with probability p. */
 const atLeastOne = (p, U) => -Math.expm1(U * Math.log1p(-Math.min(p, 1)));
-const coverage = (h, U) => {
-  let sum = 0;
-  for (let j = 0; j < n; j++) sum += atLeastOne(h[j], U);
-  return sum;
-};
 
-/** Mean (0), 5 % (1) or 95 % (2) quantile over posterior draws; undefined where U has none. */
+/** Niches reached: mean (0), 5 % (1) or 95 % (2) quantile over posterior draws, at a stop U. */
 function score(which, niche, l, U) {
-  const u = data.sizes.indexOf(U);
-  return u < 0 ? undefined : scores[((which * data.sizes.length + u) * LONGEST + l - 1) * n + niche];
+  const block = (which * data.sizes.length + data.sizes.indexOf(U)) * LONGEST + l - 1;
+  return (scores[block * n + niche] * scoreScale[block]) / 65535;
+}
+
+/** States that an elite's lineage went through, from its first ancestor on; none where there is no elite. */
+function lineage(niche) {
+  const found = [];
+  for (let birth = past.elite[niche]; birth >= 0; birth = past.parent[birth]) found.push(past.niche[birth]);
+  return found.reverse();
 }

@@ -7,24 +7,21 @@ const MARGIN = { left: 62, right: 12, top: 8, bottom: 44 };
 const view = { zoom: 1, x: 0.5, y: 0.5 };
 let frame = { x: 0, y: 0, width: 1, height: 1, scale: 1 };
 let shown = [];
+let scaleOf = null;
 
+// Cells are drawn in a box of 1 by 1, which is put where it belongs.
+const inBox = ([x, y]) => [(x - left) / (right - left), (top - y) / (top - bottom)];
+const around = (niche) => `M${outline(niche).map((corner) => inBox(corner).map((v) => v.toFixed(6))).join("L")}Z`;
 const rectangles = everywhere((niche) => {
-  const [i, j] = index(niche);
-  const rectangle = make("rect", {
-    x: i, y: rows - 1 - j, width: 1, height: 1, tabindex: -1, role: "option", "aria-selected": "false",
+  const rectangle = make("path", {
+    d: around(niche), tabindex: -1, role: "option", "aria-selected": "false",
     "aria-label": `niche ${label(niche)}, ${at(center(niche))}${visits[niche] ? "" : ", never filled"}`,
   });
   rectangle.dataset.niche = niche;
   return rectangle;
 });
 cells.append(...rectangles);
-const hatch = make("path", {
-  class: "hatch",
-  d: everywhere((niche) => {
-    const [i, j] = index(niche);
-    return children[niche] && children[niche] < FEW ? `M${i} ${rows - j}l1 -1m-.5 0l-.5 .5m.5 .5l.5 -.5` : "";
-  }).join(""),
-});
+const hatch = make("path", { class: "hatch", fill: "url(#stripes)" });
 cells.append(hatch);
 
 /** Where a point of behavior is on the screen. */
@@ -47,11 +44,13 @@ function layOut() {
     view[axis] = Math.min(Math.max(view[axis], half), 1 - half);
   }
   const [x, y] = onScreen([left, top]);
-  cells.setAttribute("transform", `translate(${x} ${y}) scale(${cell[0] * frame.scale} ${cell[1] * frame.scale})`);
+  const box = [(right - left) * frame.scale, (top - bottom) * frame.scale];
+  cells.setAttribute("transform", `translate(${x} ${y}) scale(${box[0]} ${box[1]})`);
+  get("stripes").setAttribute("patternTransform", `scale(${1 / box[0]} ${1 / box[1]}) rotate(45)`);
   // Marks on the border are not cut in half.
   for (const [id, pad] of [["clip", 0], ["overlay-clip", 9]]) {
-    const box = { x: frame.x - pad, y: frame.y - pad, width: frame.width + 2 * pad, height: frame.height + 2 * pad };
-    for (const [key, value] of Object.entries(box)) get(id).setAttribute(key, value);
+    const sides = { x: frame.x - pad, y: frame.y - pad, width: frame.width + 2 * pad, height: frame.height + 2 * pad };
+    for (const [key, value] of Object.entries(sides)) get(id).setAttribute(key, value);
   }
   drawAxes();
   drawOverlay();
@@ -87,48 +86,6 @@ function drawAxes() {
   axes.append(make("text", { x: turn[0], y: turn[1], "text-anchor": "middle", transform: `rotate(-90 ${turn})` }, `${data.axes[1]} (${data.unit})`));
 }
 
-/** Transitions out of a state: its children's states with probability and births, the surest first. */
-function transitions(from) {
-  const seen = new Map();
-  for (let k = counts.start[from]; k < counts.start[from + 1]; k++) seen.set(counts.column[k], counts.count[k]);
-  return Array.from(row(from), (probability, to) => ({
-    to, probability, births: seen.get(to) || 0,
-    distance: to < n && from < n ? distance(from, to) : NaN,
-    wormhole: wormholes.get(from * S + to),
-  })).sort((a, b) => b.probability - a.probability);
-}
-const isFar = (edge) => edge.distance >= far;
-
-function drawOverlay() {
-  overlay.replaceChildren();
-  const styles = getComputedStyle(document.documentElement);
-  const arrows = strongest().concat(longJumps()).filter((edge) => edge.to < n);
-  for (const edge of arrows.reverse()) {
-    const [a, b] = [onScreen(center(state.niche)), onScreen(center(edge.to))];
-    const colour = styles.getPropertyValue(isFar(edge) ? "--jump" : "--edge");
-    const width = 1.2 + 5 * Math.sqrt(edge.probability);
-    // Curved, so that an arrow and its opposite do not lie on each other.
-    const bend = [(a[0] + b[0]) / 2 - 0.14 * (b[1] - a[1]), (a[1] + b[1]) / 2 + 0.14 * (b[0] - a[0])];
-    const angle = Math.atan2(b[1] - bend[1], b[0] - bend[0]);
-    const size = 5 + 1.6 * width;
-    const foot = [b[0] - size * 0.8 * Math.cos(angle), b[1] - size * 0.8 * Math.sin(angle)];
-    const wing = (turn) => `${b[0] - size * Math.cos(angle + turn)},${b[1] - size * Math.sin(angle + turn)}`;
-    const path = `M${a}Q${bend} ${foot}`;
-    const dash = edge.births ? "none" : "2 5";
-    overlay.append(make("path", { class: "arrow", d: path, stroke: styles.getPropertyValue("--halo"), "stroke-width": width + 2.5, opacity: 0.75 }));
-    overlay.append(make("path", { class: "arrow", d: path, stroke: colour, "stroke-width": width, "stroke-dasharray": dash }));
-    overlay.append(make("polygon", { points: `${b} ${wing(0.45)} ${wing(-0.45)}`, fill: colour, stroke: styles.getPropertyValue("--halo"), "stroke-width": 0.8 }));
-  }
-  if (data.start) {
-    const [x, y] = onScreen(data.start);
-    overlay.append(make("path", { class: "start", d: `M${x - 2.5} ${y - 7.5}h5v5h5v5h-5v5h-5v-5h-5v-5h5z` }));
-  }
-  const [i, j] = index(state.niche);
-  const [x, y] = onScreen([left + i * cell[0], bottom + (j + 1) * cell[1]]);
-  const box = { x, y, width: cell[0] * frame.scale, height: cell[1] * frame.scale, rx: 2 };
-  overlay.append(make("rect", { ...box, class: "chosen-halo" }), make("rect", { ...box, class: "chosen" }));
-}
-
 function paint() {
   const map = MAPS[state.colour];
   const values = map.values();
@@ -139,13 +96,17 @@ function paint() {
   if (!known.length || low === high) [low, high] = known.length ? [low, low + 1] : [0, 1];
   const to = { root: Math.sqrt, log: Math.log }[map.scale] || ((v) => v);
   const from = { root: (v) => v * v, log: Math.exp }[map.scale] || ((v) => v);
+  // Beside another archive, both have one scale.
+  if (range && range.key === rangeKey()) [low, high] = [Math.min(low, range.low), Math.max(high, range.high)];
+  tellRange(low, high);
   const place = (value) => (to(value) - to(low)) / (to(high) - to(low));
   const colours = map.colours ? map.colours() : VIRIDIS;
   rectangles.forEach((rectangle, niche) => {
     rectangle.style.fill = Number.isFinite(values[niche]) ? ramp(colours, place(values[niche])) : "var(--empty)";
   });
-  hatch.style.display = map.hatched ? "" : "none";
-  drawLegend(map, [low, from((to(low) + to(high)) / 2), high], colours);
+  hatch.setAttribute("d", map.hatched ? everywhere((j) => (soFar("children", j) && children[j] < FEW ? around(j) : "")).join("") : "");
+  scaleOf = { map, marks: [low, from((to(low) + to(high)) / 2), high], colours };
+  drawLegend(map, scaleOf.marks, colours);
 }
 
 function drawLegend(map, marks, colours) {
@@ -155,14 +116,18 @@ function drawLegend(map, marks, colours) {
   const digits = [2, 3, 4, 5].find((count) => new Set(marks.map((mark) => number(mark, count))).size === 3) || 6;
   bar.append(...marks.map((mark) => make("span", {}, number(mark, digits))));
   const keys = [
-    ["var(--edge)", "transition"],
-    ["var(--jump)", `long jump, ${number(far, 2)} ${data.unit} or more`],
+    ...({
+      out: [["var(--edge)", "children land"], ["var(--jump)", `the same, ${number(far, 2)} ${data.unit} or farther`]],
+      in: [["var(--edge)", "children come from"], ["var(--jump)", `the same, ${number(far, 2)} ${data.unit} or farther`]],
+      lineage: [["var(--lineage)", "the elite's ancestors"]],
+    }[state.arrows] || []),
     ["var(--start)", "start", "M5 0h5v5h5v5h-5v5H5v-5H0V5h5z"],
   ];
-  if (!map.colours) keys.push(["var(--empty)", map.hatched ? "never a parent" : "never filled", "M0 0h15v15H0z"]);
+  if (state.stage < last) keys.push(["var(--empty)", map.colours ? "" : `not yet among the first ${data.stages[state.stage]} births`, "M0 0h15v15H0z"]);
+  else if (!map.colours) keys.push(["var(--empty)", map.hatched ? "never a parent" : "never filled", "M0 0h15v15H0z"]);
   if (map.hatched) keys.push(["none", `under ${FEW} births`, "M0 15L15 0M0 8L8 0M7 15L15 7"]);
   const line = "M0 6h9V3l6 4.5L9 12V9H0z";
-  get("legend").replaceChildren(bar, ...keys.filter(([, text]) => text !== "start" || data.start).map(([colour, text, d]) => {
+  get("legend").replaceChildren(bar, ...keys.filter(([, text]) => text && (text !== "start" || data.start)).map(([colour, text, d]) => {
     const key = make("span", { class: "key" });
     const picture = document.createElementNS("http://www.w3.org/2000/svg", "svg");
     picture.setAttribute("width", 15);

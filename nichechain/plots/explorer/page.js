@@ -9,6 +9,7 @@ function choose(niche, { focus = false } = {}) {
   if (focus) rectangles[niche].focus({ preventScroll: true });
   state.h = visitProbabilities(niche);
   state.edges = transitions(niche);
+  state.incoming = transitionsInto(niche);
   keepInView(niche);
   layOut();
   update();
@@ -21,11 +22,26 @@ function update() {
   get("u").setAttribute("aria-valuetext", state.U);
   get("u-value").textContent = state.U;
   get("colour").value = state.colour;
+  get("arrows").value = state.arrows;
+  get("stage").value = state.stage;
+  const births = data.stages[state.stage];
+  get("stage").setAttribute("aria-valuetext", births);
+  get("stage-value").textContent = births;
+  get("go").value = label(state.niche);
+  range = null;
   paint();
   drawPanel();
-  get("live").textContent = `Niche ${label(state.niche)}: ${coverage(state.h[state.l - 1], state.U).toFixed(1)} niches reached, ` +
+  get("live").textContent = `Niche ${label(state.niche)}: ${niches(score(0, state.niche, state.l, state.U))} niches reached, ` +
     `${visits[state.niche]} births${visits[state.niche] ? "" : ", never filled"}`;
-  history.replaceState(null, "", `#niche=${label(state.niche)}&l=${state.l}&U=${state.U}&colour=${state.colour}`);
+  remember();
+  tell({ niche: state.niche, l: state.l, U: state.U, colour: state.colour, arrows: state.arrows, stage: state.stage });
+}
+
+/** The address says what is shown; a page within another has none of its own. */
+function remember() {
+  if (beside) return;
+  const { l, U, colour, arrows } = state;
+  history.replaceState(null, "", `#niche=${label(state.niche)}&l=${l}&U=${U}&colour=${colour}&arrows=${arrows}&births=${data.stages[state.stage]}`);
 }
 
 /** Move the view, if it is zoomed in, so far that a niche can be seen. */
@@ -42,7 +58,8 @@ function keepInView(niche) {
 
 function zoom(factor, point) {
   const box = svg.getBoundingClientRect();
-  const pixel = point ? [point[0] - box.left, point[1] - box.top] : [frame.x + frame.width / 2, frame.y + frame.height / 2];
+  // Without a pointer, what is chosen stays where it is.
+  const pixel = point ? [point[0] - box.left, point[1] - box.top] : onScreen(center(state.niche));
   const behavior = (p) => [
     left + view.x * (right - left) + (p[0] - frame.x - frame.width / 2) / frame.scale,
     bottom + view.y * (top - bottom) - (p[1] - frame.y - frame.height / 2) / frame.scale,
@@ -53,6 +70,7 @@ function zoom(factor, point) {
   const after = behavior(pixel);
   view.x += (before[0] - after[0]) / (right - left);
   view.y += (before[1] - after[1]) / (top - bottom);
+  if (!point) keepInView(state.niche);
   layOut();
 }
 
@@ -63,20 +81,57 @@ function showTip(niche, x, y) {
     `niche ${label(niche)}`,
     at(center(niche)),
     `${map.legend()}: ${number(shown[niche])}`,
-    visits[niche] ? `${visits[niche]} births, ${children[niche]} of parents here` : "never filled",
+    visits[niche] ? `${some(visits[niche], "birth")}, ${children[niche]} of parents here` : "never filled",
   ].join("\n");
   tip.hidden = false;
-  const room = get("stage").getBoundingClientRect();
+  const room = get("map").getBoundingClientRect();
   const size = tip.getBoundingClientRect();
   tip.style.left = `${Math.min(x - room.left + 14, room.width - size.width)}px`;
   tip.style.top = `${y - room.top + 16 + size.height > room.height ? y - room.top - size.height - 10 : y - room.top + 16}px`;
+}
+
+/** The nearest niche to the chosen one in a direction: its neighbour on a grid. */
+function neighbour([dx, dy]) {
+  if (data.shape) {
+    const [i, j] = index(state.niche);
+    return i + dx >= 0 && i + dx < columns && j + dy >= 0 && j + dy < rows ? (i + dx) * rows + j + dy : state.niche;
+  }
+  const [x, y] = center(state.niche);
+  let [best, least] = [state.niche, Infinity];
+  for (let other = 0; other < n; other++) {
+    const [ox, oy] = [center(other)[0] - x, center(other)[1] - y];
+    const [along, across] = [ox * dx + oy * dy, Math.abs(ox * dy) + Math.abs(oy * dx)];
+    const far = along + across;
+    if (along > 0 && across <= along && far < least) [best, least] = [other, far];
+  }
+  return best;
+}
+
+/** The niche of a name such as 14,3, whatever is between the numbers; -1 if there is none. */
+function named(text) {
+  const numbers = (text.match(/\d+/g) || []).join(",");
+  return rectangles.findIndex((_, k) => label(k) === numbers);
+}
+
+function goTo(text) {
+  const niche = named(text);
+  const example = data.shape ? `${columns - 1},${rows - 1}` : String(n - 1);
+  get("go").setCustomValidity(niche < 0 ? `There is no such niche: they go up to ${example}.` : "");
+  if (niche < 0) get("go").reportValidity();
+  else choose(niche);
 }
 
 const nicheAt = (event) => (event.target.dataset && event.target.dataset.niche !== undefined ? Number(event.target.dataset.niche) : null);
 const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowDown: [0, -1], ArrowUp: [0, 1] };
 
 function listen() {
-  get("controls").addEventListener("submit", (event) => event.preventDefault());
+  get("controls").addEventListener("submit", (event) => { event.preventDefault(); goTo(get("go").value); });
+  get("go").addEventListener("input", () => get("go").setCustomValidity(""));
+  get("go").addEventListener("change", () => goTo(get("go").value));
+  get("arrows").addEventListener("input", (event) => { state.arrows = event.target.value; update(); drawOverlay(); });
+  get("stage").addEventListener("input", (event) => { state.stage = Number(event.target.value); update(); });
+  get("save-picture").addEventListener("click", savePicture);
+  get("save-table").addEventListener("click", saveTable);
   get("l").addEventListener("input", (event) => { state.l = Number(event.target.value); update(); });
   get("u").addEventListener("input", (event) => { state.U = stops[Number(event.target.value)]; update(); });
   get("colour").addEventListener("input", (event) => { state.colour = event.target.value; update(); });
@@ -88,8 +143,7 @@ function listen() {
   cells.addEventListener("keydown", (event) => {
     get("tip").hidden = true;
     if (event.key in ARROWS && !event.ctrlKey && !event.altKey && !event.metaKey) {
-      const [i, j] = index(state.niche).map((k, axis) => k + ARROWS[event.key][axis]);
-      if (i >= 0 && i < columns && j >= 0 && j < rows) choose(i * rows + j, { focus: true });
+      choose(neighbour(ARROWS[event.key]), { focus: true });
     } else if (event.key === "+" || event.key === "=") zoom(1.5);
     else if (event.key === "-") zoom(1 / 1.5);
     else if (event.key === "0") zoom(0);
@@ -129,14 +183,14 @@ function listen() {
     event.preventDefault();
     zoom(Math.exp(-event.deltaY / 400), [event.clientX, event.clientY]);
   }, { passive: false });
-  new ResizeObserver(layOut).observe(get("stage"));
+  new ResizeObserver(layOut).observe(get("map"));
 }
 
 function setTheme(name) {
   document.documentElement.dataset.theme = name;
   get("theme").textContent = name === "dark" ? "Light" : "Dark";
   get("theme").setAttribute("aria-label", `Switch to ${name === "dark" ? "light" : "dark"} colours`);
-  if (state.edges) {
+  if (state.h.length) {
     drawOverlay();
     paint();
   }
@@ -149,9 +203,43 @@ function fromAddress() {
   if (Number.isInteger(l) && l >= 1 && l <= LONGEST) state.l = l;
   if (stops.includes(Number(asked.get("U")))) state.U = Number(asked.get("U"));
   if (Object.hasOwn(MAPS, asked.get("colour"))) state.colour = asked.get("colour");
+  if (["out", "in", "lineage", "none"].includes(asked.get("arrows"))) state.arrows = asked.get("arrows");
+  const stage = data.stages.indexOf(Number(asked.get("births")));
+  if (stage >= 0) state.stage = stage;
   const niche = rectangles.findIndex((_, k) => label(k) === asked.get("niche"));
   return niche >= 0 ? niche : liveliest();
 }
+
+/* Beside another archive: what is chosen in one page is chosen in both, on one scale of colours. */
+
+const beside = window.parent !== window;
+let range = null;
+let following = false;
+const tell = (what) => { if (beside && !following) window.parent.postMessage(what, "*"); };
+const rangeKey = () => `${state.colour} ${state.l} ${state.U}`;
+function tellRange(low, high) {
+  if (beside && !range) window.parent.postMessage({ range: { key: rangeKey(), low, high } }, "*");
+}
+
+function follow({ range: told, ...what }) {
+  following = true;
+  if (told) {
+    if (told.key === rangeKey()) {
+      range = told;
+      paint();
+    }
+  } else {
+    const { niche, stage, ...rest } = what;
+    Object.assign(state, rest);
+    if (!Object.hasOwn(MAPS, state.colour)) state.colour = "evolvability";
+    if (!stops.includes(state.U)) state.U = stops.reduce((best, size) => (Math.abs(size - what.U) < Math.abs(best - what.U) ? size : best));
+    state.stage = Math.min(stage, last);
+    if (niche < n && niche !== state.niche) choose(niche);
+    else { update(); drawOverlay(); }
+  }
+  following = false;
+}
+if (beside) window.addEventListener("message", (event) => { if (event.source === window.parent) follow(event.data); });
 
 /** Of the niches that births speak of, the one whose lineages reach most. */
 function liveliest() {
@@ -165,17 +253,20 @@ get("title").textContent = data.name;
 get("summary").textContent = `${data.domain}: ${data.filled} of ${n} niches filled by ${data.births} births, ` +
   `${((100 * data.birthsOutside) / Math.max(1, data.births)).toFixed(1)} % of them outside; T: ${data.estimator}`;
 get("method").textContent = "Convention: definition, the root's own niche counts only if a descendant returns to it. " +
-  "A lineage has l generations; U lineages have l·U descendants. " +
+  "A lineage has l generations; U lineages have l·U descendants. Arrows, and where lineages go, are by the mean of T" +
+  (data.strongest ? `, of which the ${data.strongest} strongest transitions of every niche are kept. ` : ". ") +
   (data.wormholes ? "Wormhole: a transition over ten times as probable as distance and destination explain. " : "") +
-  "Dotted arrow: no birth did this.";
+  (data.pairsLeftOut ? "" : "Dotted arrow: no birth did this. ") +
+  "Numbers of niches are those of the whole search, whatever births are shown.";
+get("stage").max = last;
+if (!hasElites) document.querySelector('#arrows [value="lineage"]').remove();
 get("u").max = stops.length - 1;
 for (const [name, map] of Object.entries(MAPS)) get("colour").append(make("option", { value: name }, map.title));
 const prefersDark = matchMedia("(prefers-color-scheme: dark)");
 setTheme(prefersDark.matches ? "dark" : "light");
 prefersDark.addEventListener("change", () => setTheme(prefersDark.matches ? "dark" : "light"));
 listen();
-state.edges = [];
 choose(fromAddress());
 
 // For tests and for the browser's console.
-window.explorer = { data, state, choose, visitProbabilities, coverage, score };
+window.explorer = { data, state, choose, visitProbabilities, score, entry, lineage, tableOfNiches, picture };

@@ -1,11 +1,5 @@
 /* The panel. */
 
-const strongest = () => state.edges.filter((edge) => edge.to !== state.niche).slice(0, 8);
-const longJumps = () => {
-  const already = strongest();
-  return state.edges.filter((edge) => edge.births && isFar(edge) && !already.includes(edge)).slice(0, 4);
-};
-
 function drawPanel() {
   const { niche, l, U } = state;
   get("niche").textContent = `Niche ${label(niche)}`;
@@ -14,65 +8,79 @@ function drawPanel() {
   warning.hidden = children[niche] >= FEW;
   warning.textContent = `${children[niche] || "No"} birth${children[niche] === 1 ? "" : "s"} behind this niche's row of T: ` +
     (given ? "little is known of where its children land." : "this is mostly what niches in general do.");
-  get("scores-title").textContent = `Niches reached by ${U} ${U === 1 ? "lineage" : "lineages"} in ${l} ${l === 1 ? "generation" : "generations"}`;
-  get("plug-in-title").textContent = given ? "exact for this T" : "plug-in";
-  get("plug-in").textContent = niches(coverage(state.h[l - 1], U));
-  get("interval-title").textContent = given ? "interval" : "mean (90 % interval)";
-  get("interval").textContent = interval();
+  get("scores-title").textContent = `Niches reached by ${lineages()} in ${generations()}`;
+  const [mean, low, high] = [0, 1, 2].map((which) => score(which, niche, l, U));
+  get("value").textContent = niches(mean);
+  get("interval").textContent = given ? "" : `90 % interval ${niches(low)} to ${niches(high)}`;
   get("score-note").textContent = given
-    ? `T is given by ${data.estimator}: it has no interval.`
-    : `Over ${data.draws} draws of T, computed beforehand for U = ${data.sizes.join(", ")}. ` +
-      "The plug-in is computed here from the mean of T, and so tends to lie above.";
+    ? `T is ${data.estimator}: the number is exact for it, and has no interval.`
+    : `Mean over ${data.draws} draws of T from what the births leave open. ` +
+      (data.simulated ? "Lineages were simulated; the interval is by the draws' standard deviation." : "");
   drawCurve();
-  table(get("edges"), strongest());
+  table(get("edges"), strongest(), "to");
   get("jumps-title").textContent = `More long jumps (${number(far, 2)} ${data.unit} or more)`;
-  table(get("jumps"), longJumps(), "no others among the births");
+  table(get("jumps"), longJumps(), "to", "no others among the births");
+  table(get("incoming"), leadHere(), "from", "no niche with enough births of parents");
   const own = state.edges.find((edge) => edge.to === niche);
   const stays = own ? own.probability : 0;
   facts(get("births"), [
     ["births in the niche", visits[niche]],
     ["births of parents in it", children[niche]],
+    ...(visits[niche] ? [["first of them", `birth ${past.first[niche]}`]] : []),
+    ...(state.stage < last ? [[`among the first ${data.stages[state.stage]}`, `${soFar("visits", niche)}, ${soFar("children", niche)}`]] : []),
     ["child stays in the niche", percent(stays)],
     ...(S > n ? [
       ["child lands outside", percent(state.edges.find((edge) => edge.to === n).probability)],
       [`lineage of ${l} passes outside`, percent(state.h[l - 1][n])],
     ] : []),
   ]);
-  const filled = Number.isFinite(elite(2, niche));
-  facts(get("elite"), filled ? [
-    [data.objectiveName, number(elite(0, niche))],
-    ["depth", `${elite(1, niche)} generations`],
-    ["behavior", at([elite(3, niche), elite(4, niche)])],
-    ["uid", elite(2, niche)],
-  ] : [["none", "the niche was never filled"]]);
+  drawElite(niche);
 }
 
-function interval() {
-  const { niche, l, U } = state;
-  if (given) return "none";
-  const [mean, low, high] = [0, 1, 2].map((which) => score(which, niche, l, U));
-  return mean === undefined ? `not for U = ${U}` : `${niches(mean)} (${niches(low)} to ${niches(high)})`;
+function drawElite(niche) {
+  const filled = Number.isFinite(elite(2, niche));
+  const states = lineage(niche);
+  get("rule").textContent = hasElites ? `: ${RULES[data.replacement] || data.replacement}` : "";
+  facts(get("elite"), filled ? [
+    [data.objectiveName, number(elite(0, niche))],
+    ["depth", some(elite(1, niche), "generation")],
+    ["behavior", at([elite(3, niche), elite(4, niche)])],
+    ["uid", elite(2, niche)],
+    ...(states.length > 1 ? [
+      ["its lineage begins", label(states[0])],
+      ["niches on its way", new Set(states.filter((place) => place < n)).size],
+    ] : []),
+  ] : [["none", hasElites ? "the niche was never filled" : "births only"]]);
+  get("way").textContent = states.length > 1 ? states.filter((place, k) => place !== states[k - 1]).map(label).join(" → ") : "";
+  const film = data.films[niche];
+  get("film").replaceChildren();
+  if (!film) return;
+  const moving = film.startsWith("data:video");
+  const shown = make(moving ? "video" : "img", { src: film, ...(moving ? { controls: "" } : { alt: `what the elite of niche ${label(niche)} does` }) });
+  get("film").append(shown);
 }
+const RULES = { random: "a birth of the niche at random", first: "its first birth", newest: "its latest birth", objective: "its best birth" };
 
 function facts(list, pairs) {
   list.replaceChildren(...pairs.flatMap(([name, value]) => [make("dt", {}, name), make("dd", {}, value)]));
 }
 
-function table(element, edges, none) {
+/** Transitions as a table; the niche at the other end is ``to`` or ``from``. */
+function table(element, edges, end, none) {
   element.replaceChildren();
   if (!edges.length) {
     element.append(make("caption", { class: "note", style: "text-align: left" }, none));
     return;
   }
   const head = make("tr");
-  head.append(...["child in", "probability", "births", `distance (${data.unit})`].map((name) => make("th", { scope: "col" }, name)));
+  head.append(...[end === "to" ? "child in" : "parent in", "probability", "births", `distance (${data.unit})`].map((name) => make("th", { scope: "col" }, name)));
   element.append(head);
   for (const edge of edges) {
     const line = make("tr");
     const target = make("td");
-    if (edge.to < n) {
-      const link = make("button", { type: "button", "aria-label": `go to niche ${label(edge.to)}` }, label(edge.to));
-      link.addEventListener("click", () => choose(edge.to));
+    if (edge[end] < n) {
+      const link = make("button", { type: "button", "aria-label": `go to niche ${label(edge[end])}` }, label(edge[end]));
+      link.addEventListener("click", () => choose(edge[end]));
       target.append(link);
     } else {
       target.textContent = "outside";
@@ -80,8 +88,8 @@ function table(element, edges, none) {
     const gap = make("td");
     if (edge.wormhole !== undefined) gap.append(make("small", { title: `posterior probability ${edge.wormhole}` }, "wormhole"));
     else if (isFar(edge)) gap.append(make("small", {}, "long jump"));
-    gap.append(edge.to < n ? number(edge.distance, 3) : "");
-    line.append(target, make("td", {}, percent(edge.probability)), make("td", {}, edge.births), gap);
+    gap.append(Number.isFinite(edge.distance) ? number(edge.distance, 3) : "");
+    line.append(target, make("td", {}, percent(edge.probability)), make("td", {}, edge.births || (data.pairsLeftOut ? "few" : 0)), gap);
     element.append(line);
   }
 }
@@ -89,34 +97,25 @@ function table(element, edges, none) {
 /** Niches reached against the number of generations. */
 function drawCurve() {
   const curve = get("curve");
-  const [width, height] = [curve.clientWidth || 350, 168];
-  const generations = Array.from({ length: LONGEST }, (_, k) => k + 1);
-  const plugIn = generations.map((g) => coverage(state.h[g - 1], state.U));
-  const drawn = given || score(0, 0, 1, state.U) === undefined ? null
-    : [0, 1, 2].map((which) => generations.map((g) => score(which, state.niche, g, state.U)));
-  const most = Math.max(...plugIn, ...(drawn ? drawn[2] : []), 1) * 1.06;
-  const x = (g) => 34 + ((g - 1) / (LONGEST - 1)) * (width - 46);
-  const y = (value) => 128 - (value / most) * 100;
+  const [width, height] = [curve.clientWidth || 350, 162];
+  const [from, to, floor] = [34, width - 12, 122];
+  const steps = Array.from({ length: LONGEST }, (_, k) => k + 1);
+  const [mean, low, high] = [0, 1, 2].map((which) => steps.map((g) => score(which, state.niche, g, state.U)));
+  const most = Math.max(...high, 1) * 1.06;
+  const x = (g) => from + ((g - 1) / (LONGEST - 1)) * (to - from);
+  const y = (value) => floor - (value / most) * (floor - 10);
   const points = (values) => values.map((value, k) => `${x(k + 1)},${y(value)}`);
-  curve.setAttribute("aria-label", `Niches reached in 1 to ${LONGEST} generations by ${state.U} lineages: ${plugIn.map((v) => v.toFixed(1)).join(", ")}`);
+  curve.setAttribute("aria-label", `Niches reached in 1 to ${LONGEST} generations by ${lineages()}: ${mean.map((v) => v.toFixed(1)).join(", ")}`);
   curve.setAttribute("viewBox", `0 0 ${width} ${height}`);
   curve.replaceChildren();
   for (const [value, text] of ticks(0, most, 3)) {
-    curve.append(make("line", { class: "frame", x1: 34, x2: width - 12, y1: y(value), y2: y(value) }));
-    curve.append(make("text", { x: 28, y: y(value) + 4, "text-anchor": "end" }, text));
+    curve.append(make("line", { class: "frame", x1: from, x2: to, y1: y(value), y2: y(value) }));
+    curve.append(make("text", { x: from - 6, y: y(value) + 4, "text-anchor": "end" }, text));
   }
-  for (const g of generations) curve.append(make("text", { x: x(g), y: 145, "text-anchor": "middle" }, g));
-  curve.append(make("text", { x: width - 12, y: 162, "text-anchor": "end" }, `generations l, with U = ${state.U}`));
-  curve.append(make("line", { class: "now", x1: x(state.l), x2: x(state.l), y1: 24, y2: 128 }));
-  if (drawn) {
-    curve.append(make("polygon", { class: "band", points: [...points(drawn[1]), ...points(drawn[2]).reverse()].join(" ") }));
-    curve.append(make("polyline", { class: "mean", points: points(drawn[0]).join(" ") }));
-  }
-  curve.append(make("polyline", { class: "plug-in", points: points(plugIn).join(" ") }));
-  const words = drawn ? [["mean and 90 %", "mean"], ["plug-in", "plug-in"]] : [[given ? "exact" : "plug-in", "plug-in"]];
-  words.forEach(([text, kind], k) => {
-    const from = 38 + k * 135;
-    curve.append(make("line", { class: kind, x1: from, x2: from + 18, y1: 10, y2: 10 }));
-    curve.append(make("text", { x: from + 23, y: 14 }, text));
-  });
+  for (const g of steps) curve.append(make("text", { x: x(g), y: floor + 17, "text-anchor": "middle" }, g));
+  curve.append(make("text", { x: to, y: floor + 34, "text-anchor": "end" }, `generations l, with ${lineages()}`));
+  curve.append(make("line", { class: "now", x1: x(state.l), x2: x(state.l), y1: 10, y2: floor }));
+  if (!given) curve.append(make("polygon", { class: "band", points: [...points(low), ...points(high).reverse()].join(" ") }));
+  curve.append(make("polyline", { class: "mean", points: points(mean).join(" ") }));
+  curve.append(make("circle", { class: "dot", cx: x(state.l), cy: y(mean[state.l - 1]), r: 4 }));
 }

@@ -1,8 +1,9 @@
 /* What is shown. */
 
-const stops = [...new Set([1, 2, 3, 5, 7, 10, 15, 20, 30, 50, 70, 100, 150, 200, 300, 500, 700, 1000, ...data.sizes])];
-stops.sort((a, b) => a - b);
-const state = { niche: 0, l: data.l, U: data.lineages, colour: "reach", h: [] };
+// Numbers were computed for these stops, so that each has its interval.
+const stops = data.sizes;
+const last = data.stages.length - 1;
+const state = { niche: 0, l: data.l, U: data.lineages, colour: "evolvability", arrows: "out", stage: last, h: [], edges: [], incoming: [] };
 const given = data.draws === 0;
 
 const VIRIDIS = ["#440154", "#482878", "#3e4989", "#31688e", "#26828e", "#1f9e89", "#35b779", "#6ece58", "#b5de2b", "#fde725"];
@@ -15,62 +16,67 @@ const reachColours = () => REACH[theme()];
 const everywhere = (value) => Array.from({ length: n }, (_, j) => value(j));
 const orNone = (known, value) => (known ? value : NaN);
 
+/** Births so far, at the stage that is shown, in a niche (visits) or of parents in it (children). */
+const soFar = (kind, niche) => past[kind][state.stage * n + niche];
+const counted = (count) => orNone(count, count);
+
 // A map: what its colours mean, and the value of every niche; NaN has no colour.
 const MAPS = {
-  reach: {
-    title: "reach of all lineages",
-    legend: () => `probability that one of ${state.U} lineages visits`,
-    values: () => everywhere((j) => atLeastOne(state.h[state.l - 1][j], state.U)),
-    scale: "root", colours: reachColours, bounds: [0, 1],
-  },
-  one: {
-    title: "reach of one lineage",
-    legend: () => "probability that one lineage visits",
-    values: () => everywhere((j) => state.h[state.l - 1][j]),
-    scale: "root", colours: reachColours, bounds: [0, 1],
-  },
   evolvability: {
-    title: "l-evolvability",
-    legend: () => `niches reached, l = ${state.l}, U = ${precomputed()}`,
-    values: () => everywhere((j) => orNone(children[j], score(0, j, state.l, precomputed()))),
+    title: "niches reached",
+    legend: () => `niches reached by ${lineages()} in ${generations()}`,
+    values: () => everywhere((j) => orNone(soFar("children", j), score(0, j, state.l, state.U))),
     hatched: true,
   },
   width: {
     title: "its interval's width",
-    legend: () => `width in niches, l = ${state.l}, U = ${precomputed()}`,
-    values: () => everywhere((j) => orNone(children[j], score(2, j, state.l, precomputed()) - score(1, j, state.l, precomputed()))),
+    legend: () => `width of the 90 % interval of niches reached by ${lineages()} in ${generations()}`,
+    values: () => everywhere((j) => orNone(soFar("children", j), score(2, j, state.l, state.U) - score(1, j, state.l, state.U))),
     hatched: true,
+  },
+  reach: {
+    title: "where all lineages go",
+    legend: () => `probability that one of ${lineages()} from the chosen niche visits`,
+    values: () => everywhere((j) => atLeastOne(state.h[state.l - 1][j], state.U)),
+    scale: "root", colours: reachColours, bounds: [0, 1],
+  },
+  one: {
+    title: "where one lineage goes",
+    legend: () => "probability that one lineage from the chosen niche visits",
+    values: () => everywhere((j) => state.h[state.l - 1][j]),
+    scale: "root", colours: reachColours, bounds: [0, 1],
   },
   visits: {
     title: "births in the niche",
     legend: () => "births",
-    values: () => everywhere((j) => orNone(visits[j], visits[j])),
+    values: () => everywhere((j) => counted(soFar("visits", j))),
     scale: "log",
   },
   children: {
-    title: "births behind the row",
+    title: "births of its parents",
     legend: () => "births of parents in the niche",
-    values: () => everywhere((j) => orNone(children[j], children[j])),
+    values: () => everywhere((j) => counted(soFar("children", j))),
     scale: "log",
+  },
+  first: {
+    title: "when it was filled",
+    legend: () => "number of the first birth in the niche",
+    values: () => everywhere((j) => orNone(soFar("visits", j), past.first[j])),
   },
   objective: {
     title: "elite: objective",
     legend: () => data.objectiveName,
-    values: () => everywhere((j) => elite(0, j)),
+    values: () => everywhere((j) => orNone(soFar("visits", j), elite(0, j))),
   },
   depth: {
     title: "elite: depth",
     legend: () => "generations since an initial birth",
-    values: () => everywhere((j) => elite(1, j)),
+    values: () => everywhere((j) => orNone(soFar("visits", j), elite(1, j))),
   },
 };
 if (given) delete MAPS.width;
-
-/** The number of lineages nearest to U that means over draws were computed for. */
-function precomputed() {
-  const gap = (size) => Math.abs(Math.log(size / state.U));
-  return data.sizes.reduce((best, size) => (gap(size) < gap(best) ? size : best));
-}
+const hasElites = data.filled > 0 && elites.some(Number.isFinite);
+if (!hasElites) for (const name of ["objective", "depth"]) delete MAPS[name];
 
 /* Words, numbers and elements. */
 
@@ -82,6 +88,9 @@ function number(value, digits = 3) {
   const text = size >= 1e-3 || size === 0 ? value.toFixed(Math.max(0, digits - 1 - Math.floor(Math.log10(size)))) : value.toExponential(digits - 1);
   return minus(text);
 }
+const some = (count, one) => `${count} ${one}${count === 1 ? "" : "s"}`;
+const lineages = () => some(state.U, "lineage");
+const generations = () => some(state.l, "generation");
 const niches = (value) => value.toFixed(value < 100 ? 1 : 0);
 const percent = (p) => (p > 0 && p < 1e-3 ? "<0.1 %" : `${(100 * p).toFixed(1)} %`);
 // To a tenth of a niche or finer.
@@ -91,7 +100,7 @@ const at = (point) => `${data.axes.map((name, k) => `${name} ${minus(point[k].to
 
 function make(name, attributes = {}, text) {
   const svg = "http://www.w3.org/2000/svg";
-  const inSvg = ["rect", "path", "text", "line", "g", "polygon", "polyline"].includes(name);
+  const inSvg = ["rect", "path", "text", "line", "g", "polygon", "polyline", "circle"].includes(name);
   const element = inSvg ? document.createElementNS(svg, name) : document.createElement(name);
   for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, value);
   if (text !== undefined) element.textContent = text;
