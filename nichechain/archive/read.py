@@ -343,7 +343,7 @@ def _check_state(elites: Elites, pending: Offspring, lineages: UnderWay, meta: M
             raise ValueError("its arrays differ in length")
     if elites.behavior.shape[1] != len(meta.config.bounds):
         raise ValueError(f"its behaviors have {elites.behavior.shape[1]} axes")
-    if len(pending) and pending.genotype.shape[1] != elites.genotype.shape[1]:
+    if len(pending) and pending.grown().shape[1] != elites.genotype.shape[1]:
         raise ValueError("its genotypes differ in length")
     if len(lineages) and lineages.genotype.shape[1] != elites.genotype.shape[1]:
         raise ValueError("its genotypes differ in length")

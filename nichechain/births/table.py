@@ -37,6 +37,7 @@ from numpy.typing import NDArray
 from nichechain.core.columns import Columnar
 from nichechain.core.errors import NichechainError
 from nichechain.domains.base import Evaluation
+from nichechain.variation.brood import Brood, grown
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -54,7 +55,8 @@ class Offspring(Columnar):
 
     Parameters
     ----------
-    genotype : (N, P) float32 array
+    genotype : (N, P) float32 array or Brood
+        A brood where who evaluates is to grow them.
     uid : (N,) int64 array
     parent_uid, parent_niche : (N,) int64 arrays
         ``NONE`` for initial births.
@@ -63,7 +65,7 @@ class Offspring(Columnar):
         Whose parent is the latest birth of a lineage.
     """
 
-    genotype: NDArray[np.float32]
+    genotype: NDArray[np.float32] | Brood
     uid: NDArray[np.int64]
     parent_uid: NDArray[np.int64]
     parent_niche: NDArray[np.int64]
@@ -75,6 +77,10 @@ class Offspring(Columnar):
         """No offspring, of genotypes of that length."""
         none = np.empty(0, np.int64)
         return cls(np.empty((0, length), np.float32), none, none, none, none, np.empty(0, bool))
+
+    def grown(self) -> NDArray[np.float32]:
+        """Their genotypes, all of them there, (N, P)."""
+        return grown(self.genotype)
 
 
 def schema(axes: int) -> pa.Schema:

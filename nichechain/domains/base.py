@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
 import numpy as np
@@ -50,6 +50,17 @@ class Evaluation:
     def __len__(self) -> int:
         return len(self.objective)
 
+    def take(self, rows: NDArray[np.int64]) -> Evaluation:
+        """The rows in another order."""
+        return replace(
+            self,
+            behavior=self.behavior[rows],
+            objective=self.objective[rows],
+            failed=self.failed[rows],
+            reasons=tuple(self.reasons[row] for row in rows.tolist()),
+            spread=None if self.spread is None else self.spread[rows],
+        )
+
     @staticmethod
     def concatenate(parts: Sequence[Evaluation]) -> Evaluation:
         """The rows of several evaluations, in order."""
@@ -59,11 +70,14 @@ class Evaluation:
             spread = np.concatenate(
                 [np.full_like(p.behavior, np.nan) if p.spread is None else p.spread for p in parts]
             )
-        # Rows that failed have no precision of their own.
-        told = {part.behavior.dtype for part in parts if not part.failed.all()}
         behavior = np.concatenate([part.behavior for part in parts])
+        if len({part.behavior.dtype for part in parts}) > 1:
+            # Rows that failed have no precision of their own.
+            told = {part.behavior.dtype for part in parts if not part.failed.all()}
+            if len(told) == 1:
+                behavior = behavior.astype(told.pop())
         return Evaluation(
-            behavior.astype(told.pop()) if len(told) == 1 else behavior,
+            behavior,
             np.concatenate([part.objective for part in parts]),
             np.concatenate([part.failed for part in parts]),
             tuple(reason for part in parts for reason in part.reasons),

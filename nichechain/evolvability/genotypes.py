@@ -19,6 +19,7 @@ from nichechain.evolvability.coverage import rarefied_coverage
 from nichechain.evolvability.question import DRAWS, Convention, Method, Question, Root
 from nichechain.evolvability.record import draw_children, own_strength, recorded_children
 from nichechain.evolvability.results import Evolvability
+from nichechain.variation.brood import litters
 
 if TYPE_CHECKING:
     from nichechain.archive.archive import Archive, Elite
@@ -142,11 +143,10 @@ def _offspring_counts(
     archive: Archive, elite: Elite, offspring: int, seed: int, executor: Executor | None
 ) -> NDArray[np.int64]:
     """States that fresh offspring of an elite land in, (S,)."""
-    children = np.stack(
-        [archive.mutate(elite.genotype, keyed(seed, Purpose.OFFSPRING, i)) for i in range(offspring)]
-    )
+    parent = np.asarray(elite.genotype)[None]
+    children = litters(archive.mutate, Purpose.OFFSPRING, parent, seed, offspring)
     domain = archive.domain
-    evaluation = domain.evaluate(children) if executor is None else executor.evaluate(domain, children)
+    evaluation = domain.evaluate(children.grow()) if executor is None else executor.evaluate(domain, children)
     if evaluation.failed.all():
         raise NichechainError(f"all {offspring} offspring failed, the first with: {evaluation.reasons[0]}")
     landed = archive.niches.of(evaluation.behavior[~evaluation.failed])

@@ -15,6 +15,7 @@ from nichechain.core.checks import check_at_least
 from nichechain.core.errors import NichechainError
 from nichechain.core.text import printable
 from nichechain.domains.base import Domain, Evaluation
+from nichechain.variation.brood import Brood, grown
 
 WORKER_DIED = "worker died"
 """Why a row failed that no worker outlives."""
@@ -28,7 +29,7 @@ class Executor(Protocol):
     def evaluate(
         self,
         domain: Domain,
-        genotypes: NDArray[np.float32],
+        genotypes: NDArray[np.float32] | Brood,
         on_done: Callable[[int], None] | None = None,
     ) -> Evaluation:
         """The rows of ``evaluate_rows(domain, genotypes)``, in order, to the bit.
@@ -36,8 +37,8 @@ class Executor(Protocol):
         Parameters
         ----------
         domain : Domain
-        genotypes : (N, P) float32 array
-            N at least 1.
+        genotypes : (N, P) float32 array or Brood
+            N at least 1. A brood is best grown by who evaluates it; ``numpy.asarray`` grows it, too.
         on_done : callable, optional
             Told how many more have been evaluated.
 
@@ -51,13 +52,13 @@ class Executor(Protocol):
         ...
 
 
-def evaluate_rows(domain: Domain, genotypes: NDArray[np.float32]) -> Evaluation:
+def evaluate_rows(domain: Domain, genotypes: NDArray[np.float32] | Brood) -> Evaluation:
     """Evaluate genotypes here; one for which the domain raises has failed, and only that one.
 
     Parameters
     ----------
     domain : Domain
-    genotypes : (N, P) float32 array
+    genotypes : (N, P) float32 array or Brood
         N at least 1.
 
     Returns
@@ -72,6 +73,8 @@ def evaluate_rows(domain: Domain, genotypes: NDArray[np.float32]) -> Evaluation:
     MemoryError
         If the domain runs out of memory, for that is not the genotype's doing.
     """
+    # Outside of what follows: a mutation that raises is not the genotype's doing.
+    genotypes = grown(genotypes)
     try:
         evaluation = domain.evaluate(genotypes)
     except (MemoryError, NichechainError):

@@ -20,7 +20,9 @@ from nichechain.core.errors import NichechainError
 from nichechain.domains.base import Domain, Evaluation
 from nichechain.domains.memory import cache_memory_of, check_cache_memory, limit_cache
 from nichechain.execution.base import WORKER_DIED, all_failed, evaluate_rows
+from nichechain.execution.growing import Letter, Receiver, Sender, by_parent
 from nichechain.execution.pieces import LOSSES, Piece, Pieces
+from nichechain.variation.brood import Brood
 
 _AHEAD = 2
 """Pieces with a worker at a time: one under way, and the next, so that it never waits for us."""
@@ -60,6 +62,7 @@ class Raised:
 
 
 Outcome = Evaluation | Raised | None
+Rows = NDArray[np.float32] | Letter
 
 
 class Workbench:
@@ -77,6 +80,7 @@ class Workbench:
         self._pickled = domain
         self._cache_memory = cache_memory
         self._domain: Domain | None = None
+        self._receiver = Receiver()
 
     def prepare(self) -> Raised | None:
         """Unpack the domain; what it raised, if it did."""
@@ -87,14 +91,16 @@ class Workbench:
             return Raised.of(error)
         return None
 
-    def evaluate(self, genotypes: NDArray[np.float32]) -> Evaluation | Raised:
+    def evaluate(self, rows: Rows) -> Evaluation | Raised:
         """Rows of a batch, or what went so wrong that it is not for a row to bear."""
         if self._domain is None and (raised := self.prepare()) is not None:
             return raised
         assert self._domain is not None
         try:
+            if isinstance(rows, Letter):
+                return evaluate_rows(self._domain, self._receiver.brood(rows))
             # A copy, for Ray's arrays are read-only, which a domain need not expect.
-            return evaluate_rows(self._domain, genotypes.copy())
+            return evaluate_rows(self._domain, rows.copy())
         except Exception as error:
             return Raised.of(error)
 
@@ -106,12 +112,17 @@ class Worker(ABC):
     ----------
     ready : Future
         Done when the worker has the domain.
+    sender : Sender
+        What it has been told of broods.
     """
 
     ready: Future[Outcome]
 
+    def __init__(self) -> None:
+        self.sender = Sender()
+
     @abstractmethod
-    def submit(self, genotypes: NDArray[np.float32]) -> Future[Outcome]:
+    def submit(self, rows: Rows) -> Future[Outcome]:
         """Send rows of a batch."""
 
     @abstractmethod
@@ -157,7 +168,7 @@ class Fleet(ABC):
     def evaluate(
         self,
         domain: Domain,
-        genotypes: NDArray[np.float32],
+        genotypes: NDArray[np.float32] | Brood,
         on_done: Callable[[int], None] | None = None,
     ) -> Evaluation:
         """Evaluate genotypes (N, P), N at least 1, telling ``on_done`` of every finished piece's size.
@@ -178,13 +189,17 @@ class Fleet(ABC):
                 self._domain = domain
                 self._proven = False
             size = self._size()
+            back = None
+            if isinstance(genotypes, Brood):
+                genotypes, back = by_parent(genotypes)
             pieces = Pieces(len(genotypes), domain.chunk, size)
             _Shift(self, domain, pieces, genotypes, on_done).work(size)
         except BaseException:
             # What is still out is of no use to anybody, and an interrupt must not wait for it.
             self._dismiss(kill=True)
             raise
-        return pieces.evaluation()
+        evaluation = pieces.evaluation()
+        return evaluation if back is None else evaluation.take(back)
 
     def close(self) -> None:
         """End the workers."""
@@ -215,13 +230,16 @@ class _Shift:
         fleet: Fleet,
         domain: Domain,
         pieces: Pieces,
-        genotypes: NDArray[np.float32],
+        genotypes: NDArray[np.float32] | Brood,
         on_done: Callable[[int], None] | None,
     ) -> None:
+        import cloudpickle
+
         self._fleet = fleet
         self._domain = domain
         self._pieces = pieces
         self._genotypes = genotypes
+        self._mutate = cloudpickle.dumps(genotypes.mutate) if isinstance(genotypes, Brood) else b""
         self._on_done = on_done
         self._held: dict[Worker, deque[Piece]] = {}
         self._news: SimpleQueue[tuple[Worker, Piece | None, Future[Outcome]]] = SimpleQueue()
@@ -282,8 +300,11 @@ class _Shift:
             if piece is None:
                 break
             held.append(piece)
-            future = worker.submit(self._genotypes[piece.start : piece.stop])
-            self._watch(worker, piece, future)
+            rows = self._genotypes[piece.start : piece.stop]
+            if isinstance(rows, Brood):
+                self._watch(worker, piece, worker.submit(worker.sender.letter(rows, self._mutate)))
+            else:
+                self._watch(worker, piece, worker.submit(rows))
 
     def _replace(self, worker: Worker, error: BaseException) -> None:
         """Hire for a lost worker, and give its pieces to the others."""

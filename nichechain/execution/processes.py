@@ -10,11 +10,8 @@ from concurrent.futures import Future
 from concurrent.futures.process import BrokenProcessPool
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from nichechain.execution.base import count_workers
-from nichechain.execution.fleet import Fleet, Outcome, Raised, Workbench, Worker
+from nichechain.execution.fleet import Fleet, Outcome, Raised, Rows, Workbench, Worker
 
 if TYPE_CHECKING:
     from nichechain.domains.base import Evaluation
@@ -64,6 +61,7 @@ class _Process(Worker):
     """A pool of one: when it breaks, we know over which rows, and the others go on."""
 
     def __init__(self, domain: bytes, cache_memory: int) -> None:
+        super().__init__()
         from loky import ProcessPoolExecutor
 
         # As many numerical threads in each process as processors would be too many.
@@ -72,9 +70,9 @@ class _Process(Worker):
         self._pool: Any = ProcessPoolExecutor(1, initializer=_begin, initargs=begun_with, env=env)
         self.ready = self._pool.submit(_prepare)
 
-    def submit(self, genotypes: NDArray[np.float32]) -> Future[Outcome]:
+    def submit(self, rows: Rows) -> Future[Outcome]:
         try:
-            future: Future[Outcome] = self._pool.submit(_evaluate, genotypes)
+            future: Future[Outcome] = self._pool.submit(_evaluate, rows)
         except BrokenProcessPool as error:
             future = Future()
             future.set_exception(error)
@@ -106,5 +104,5 @@ def _prepare() -> Raised | None:
     return _bench[0].prepare()
 
 
-def _evaluate(genotypes: NDArray[np.float32]) -> Evaluation | Raised:
-    return _bench[0].evaluate(genotypes)
+def _evaluate(rows: Rows) -> Evaluation | Raised:
+    return _bench[0].evaluate(rows)

@@ -7,12 +7,9 @@ import os
 from concurrent.futures import Future
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from nichechain.core.errors import NichechainError
 from nichechain.execution.base import available_cpus
-from nichechain.execution.fleet import Fleet, Outcome, Workbench, Worker
+from nichechain.execution.fleet import Fleet, Outcome, Rows, Workbench, Worker
 
 
 class Ray(Fleet):
@@ -73,12 +70,13 @@ class Ray(Fleet):
 
 class _Actor(Worker):
     def __init__(self, ray: Any, handle: Any) -> None:
+        super().__init__()
         self._ray = ray
         self._handle = handle
         self.ready = handle.prepare.remote().future()
 
-    def submit(self, genotypes: NDArray[np.float32]) -> Future[Outcome]:
-        future: Future[Outcome] = self._handle.evaluate.remote(genotypes).future()
+    def submit(self, rows: Rows) -> Future[Outcome]:
+        future: Future[Outcome] = self._handle.evaluate.remote(rows).future()
         return future
 
     def stop(self, *, kill: bool) -> None:  # noqa: ARG002  # an idle actor has nothing to leave behind

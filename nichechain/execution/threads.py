@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from queue import SimpleQueue
 from types import TracebackType
 
 import numpy as np
@@ -12,6 +14,7 @@ from numpy.typing import NDArray
 from nichechain.domains.base import Domain, Evaluation
 from nichechain.domains.memory import check_cache_memory, limit_cache
 from nichechain.execution.base import count_workers, evaluate_rows
+from nichechain.variation.brood import Brood
 
 
 class Threads:
@@ -36,33 +39,51 @@ class Threads:
         if cache_memory is not None:
             check_cache_memory(cache_memory)
         self._cache_memory = cache_memory
-        self._pool = ThreadPoolExecutor(count_workers(workers), thread_name_prefix="nichechain")
+        self._workers = count_workers(workers)
+        self._pool = ThreadPoolExecutor(self._workers, thread_name_prefix="nichechain")
 
     def evaluate(
         self,
         domain: Domain,
-        genotypes: NDArray[np.float32],
+        genotypes: NDArray[np.float32] | Brood,
         on_done: Callable[[int], None] | None = None,
     ) -> Evaluation:
         """Evaluate genotypes (N, P), N at least 1, telling ``on_done`` of every finished chunk's size."""
         if self._cache_memory is not None:
             limit_cache(domain, self._cache_memory)
-        # Chunks are views, so a long queue of them costs next to nothing.
-        futures = [
-            self._pool.submit(evaluate_rows, domain, genotypes[first : first + domain.chunk])
-            for first in range(0, len(genotypes), domain.chunk)
-        ]
+        waiting = deque(range(0, len(genotypes), domain.chunk))
+        chunks = len(waiting)
+        parts: dict[int, Evaluation] = {}
+        news: SimpleQueue[tuple[int, Evaluation] | BaseException] = SimpleQueue()
+
+        def work() -> None:
+            while True:
+                try:
+                    first = waiting.popleft()
+                except IndexError:
+                    return
+                try:
+                    rows = genotypes[first : first + domain.chunk]
+                    news.put((first, evaluate_rows(domain, rows)))
+                except BaseException as error:
+                    news.put(error)
+                    return
+
         try:
-            parts = []
-            for future in futures:
-                parts.append(future.result())
+            for _ in range(min(self._workers, chunks)):
+                self._pool.submit(work)
+            while len(parts) < chunks:
+                told = news.get()
+                if isinstance(told, BaseException):
+                    raise told
+                first, part = told
+                parts[first] = part
                 if on_done is not None:
-                    on_done(len(parts[-1]))
+                    on_done(len(part))
         except BaseException:
-            for future in futures:
-                future.cancel()
+            waiting.clear()
             raise
-        return Evaluation.concatenate(parts)
+        return Evaluation.concatenate([parts[first] for first in sorted(parts)])
 
     def close(self) -> None:
         """Let go of the threads once what they are at is done."""

@@ -11,11 +11,12 @@ from numpy.typing import ArrayLike, NDArray
 from nichechain.births.table import NONE
 from nichechain.core.checks import as_floats
 from nichechain.core.errors import NichechainError
-from nichechain.core.randomness import Purpose, keyed
+from nichechain.core.randomness import Purpose
 from nichechain.domains.base import Domain, Evaluation, check_genotypes
 from nichechain.landscape.behaviors import EPSILON
 from nichechain.landscape.measures import check_sample_size, measure_behaviors
 from nichechain.variation import Mutation
+from nichechain.variation.brood import litters
 
 if TYPE_CHECKING:
     from nichechain.execution import Executor
@@ -147,8 +148,7 @@ def make_offspring(
 
     The i-th child of every parent (G, P) is made with the same noise, whatever else is measured.
     """
-    children = [mutate(p, keyed(seed, Purpose.OFFSPRING, i)) for p in parents for i in range(sample_size)]
-    return np.stack(children) if children else np.empty((0, parents.shape[1]), np.float32)
+    return litters(mutate, Purpose.OFFSPRING, parents, seed, sample_size).grow()
 
 
 def niches_of(evaluation: Evaluation, niches: Niches | None) -> NDArray[np.int64]:

@@ -97,19 +97,40 @@ class EliteArchive:
             },
         )
         self._outside: Elites | None = None
-        self._largest_key = np.full(len(niches) + 1, -np.inf)
+        self._largest_key = [-np.inf] * (len(niches) + 1)
 
     @property
     def filled(self) -> int:
         """Niches with an elite; the outside state is not one."""
         return len(self._grid)
 
-    def add(self, candidates: Elites) -> NDArray[np.bool_]:
-        """Offer births that did not fail; true where one is larger than all before it in its niche.
+    def offer(self, niche: NDArray[np.int64], key: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Judge births that did not fail: one by one, so that it does not matter how batches are cut.
+
+        Parameters
+        ----------
+        niche : (N,) int64 array
+        key : (N,) float64 array
+
+        Returns
+        -------
+        (N,) bool array
+            Whose key is larger than all before it in its niche. The last of each niche has to be
+            put in.
+        """
+        accepted = np.zeros(len(niche), bool)
+        for i, (state, value) in enumerate(zip(niche.tolist(), key.tolist(), strict=True)):
+            if value > self._largest_key[state]:
+                self._largest_key[state] = value
+                accepted[i] = True
+        return accepted
+
+    def put(self, winners: Elites) -> None:
+        """Put in the elites of some states, which were accepted.
 
         pyribs gets only those in the grid: it would put the others in edge cells without a word.
         """
-        inside = candidates[candidates.niche < len(self._niches)]
+        inside = winners[winners.niche < len(self._niches)]
         if len(inside):
             self._grid.add(
                 inside.genotype,
@@ -119,19 +140,9 @@ class EliteArchive:
                 uid=inside.uid,
                 depth=inside.depth,
             )
-        outside = candidates[candidates.niche == len(self._niches)]
-        if self._outside is not None:
-            outside = Elites.concatenate([self._outside, outside])
+        outside = winners[winners.niche == len(self._niches)]
         if len(outside):
-            # argmax takes the first of equals, as pyribs does: the elite that is there stays.
-            self._outside = outside[np.array([np.argmax(outside.key)])]
-        # One by one, so that it does not matter how births are cut into batches.
-        accepted = np.zeros(len(candidates), bool)
-        for i, (niche, key) in enumerate(zip(candidates.niche, candidates.key, strict=True)):
-            if key > self._largest_key[niche]:
-                self._largest_key[niche] = key
-                accepted[i] = True
-        return accepted
+            self._outside = outside
 
     def occupied(self) -> NDArray[np.int64]:
         """States that have an elite, sorted."""

@@ -1,14 +1,17 @@
 """MAP-Elites that remembers who was born where, and from which niche.
 
-One step: draw parents from the occupied niches, mutate, evaluate, keep. Elites live in
-a pyribs archive. Which birth of a niche is its elite follows one rule, *the largest key wins*,
-so the elites after N births are a function of the set of births, in whatever order they came.
+One step: draw parents from the occupied niches, mutate, evaluate, keep. Mutation is left to who
+evaluates. Elites live in a pyribs archive. Which birth of a niche is its elite follows one rule, *the
+largest key wins*, so the elites after N births are a function of the set of births, in whatever order
+they came.
 Some of the children come from unselected lineages instead, see :mod:`nichechain.search.lineages`.
 """
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -28,6 +31,9 @@ from nichechain.search.lineages import Stretch, UnderWay
 from nichechain.search.parents import CuriosityScores, draw_curious
 from nichechain.search.savings import Savings
 from nichechain.variation import Mutation
+from nichechain.variation.brood import Brood
+
+_NUMBERS = itertools.count()
 
 
 class MapElites:
@@ -76,6 +82,8 @@ class MapElites:
         if config.selection == "curiosity" and state is not None and curiosity is None:
             raise NichechainError("a search that selects by curiosity goes on from its scores: give them")
         self._curiosity = curiosity or CuriosityScores()
+        # Tells its elites from those of any other search in this process.
+        self._number = next(_NUMBERS)
         self._domain = domain
         self._niches = niches
         self._config = config
@@ -89,7 +97,8 @@ class MapElites:
         self.savings = Savings()
         self.settled = True
         if state is not None:
-            self._archive.add(state.elites)
+            self._archive.offer(state.elites.niche, state.elites.key)
+            self._archive.put(state.elites)
             self._pending = state.pending
             self._lineages = state.lineages
             self.births = state.births
@@ -99,7 +108,8 @@ class MapElites:
     def state(self) -> SearchState:
         """The search after its last finished batch."""
         elites = self._archive.elites(self._archive.occupied())
-        return SearchState(elites, self._pending, self.births, self.step, self._lineages)
+        pending = replace(self._pending, genotype=self._pending.grown())
+        return SearchState(elites, pending, self.births, self.step, self._lineages)
 
     @property
     def filled(self) -> int:
@@ -169,30 +179,38 @@ class MapElites:
             drawn = draw_curious(scores, batch, rng)
         else:
             drawn = rng.integers(len(occupied), size=batch)
-        parents = self._archive.elites(occupied[drawn])
+        distinct, parent = np.unique(drawn, return_inverse=True)
+        elites = self._archive.elites(occupied[distinct])
         # Drawn for every child, so that a lineage begins at an elite that its first birth had drawn.
         slot, goes_on = self._stretch.slots(step)
         latest = np.where(goes_on, self._lineages.rows(slot), NONE)
         unselected = latest != NONE
+        # Parents are the elites that were drawn, and behind them the lineages under way.
+        parent[unselected] = len(elites) + latest[unselected]
 
         def whose(name: str) -> NDArray[Any]:
-            of: NDArray[Any] = getattr(parents, name).copy()
-            of[unselected] = getattr(self._lineages, name)[latest[unselected]]
+            of: NDArray[Any] = np.concatenate([getattr(elites, name), getattr(self._lineages, name)])
             return of
 
         uid = self._first_uid(step) + np.arange(batch)
-        genotypes = zip(whose("genotype"), uid.tolist(), strict=True)
-        return Offspring(
-            np.stack([self._child(*pair) for pair in genotypes]),
+        parent_uid = whose("uid")
+        brood = Brood(
+            self._mutate,
+            Purpose.MUTATION,
+            whose("genotype"),
+            (self._config.seed,) * len(parent_uid),
+            parent,
             uid,
-            whose("uid"),
-            whose("niche"),
-            whose("depth") + 1,
+            [(self._number, one) for one in parent_uid.tolist()],
+        )
+        return Offspring(
+            brood,
+            uid,
+            parent_uid[parent],
+            whose("niche")[parent],
+            whose("depth")[parent] + 1,
             unselected,
         )
-
-    def _child(self, parent: NDArray[np.float32], uid: int) -> NDArray[np.float32]:
-        return self._mutate(parent, keyed(self._config.seed, Purpose.MUTATION, uid))
 
     def _first_uid(self, step: int) -> int:
         return 0 if step == 0 else self._stretch.uid(step)
@@ -201,17 +219,23 @@ class MapElites:
         fine = ~evaluation.failed
         niche = np.full(len(offspring), NONE, np.int64)
         niche[fine] = self._niches.of(evaluation.behavior[fine])
-        candidates = Elites(
-            niche,
-            offspring.genotype,
-            evaluation.behavior.astype(np.float64),
-            evaluation.objective,
-            self._keys(offspring.uid, evaluation.objective),
-            offspring.uid,
-            offspring.depth,
-        )
+        keys = self._keys(offspring.uid, evaluation.objective)
         accepted = np.zeros(len(offspring), bool)
-        accepted[fine] = self._archive.add(candidates[fine])
+        accepted[fine] = self._archive.offer(niche[fine], keys[fine])
+        # Of each niche the last that was accepted stays. Only what stays, or has children, is grown here.
+        last = {state: row for row, state in enumerate(niche.tolist()) if accepted[row]}
+        winners = np.array(sorted(last.values()), np.int64)
+        self._archive.put(
+            Elites(
+                niche[winners],
+                offspring[winners].grown(),
+                evaluation.behavior[winners].astype(np.float64),
+                evaluation.objective[winners],
+                keys[winners],
+                offspring.uid[winners],
+                offspring.depth[winners],
+            )
+        )
         self._lineages = self._gone_on(offspring, niche)
         if self._config.selection == "curiosity":
             self._curiosity.tell(offspring.parent_uid, accepted)
@@ -227,7 +251,11 @@ class MapElites:
             can &= niche < len(self._niches)
         ours, ended = (slot != NONE) & can, (slot != NONE) & ~can
         births = UnderWay(
-            slot[ours], offspring.genotype[ours], offspring.uid[ours], niche[ours], offspring.depth[ours]
+            slot[ours],
+            offspring[ours].grown(),
+            offspring.uid[ours],
+            niche[ours],
+            offspring.depth[ours],
         )
         return self._lineages.after(births, slot[ended])
 

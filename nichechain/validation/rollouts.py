@@ -12,12 +12,13 @@ from numpy.typing import NDArray
 from nichechain.archive.archive import Archive
 from nichechain.births.table import NONE
 from nichechain.chain.model import NicheChain
-from nichechain.core.checks import check_at_least, check_whole
+from nichechain.core.checks import check_at_least, check_seed, check_whole
 from nichechain.core.errors import NichechainError
 from nichechain.core.randomness import Purpose, keyed
 from nichechain.evolvability.niches import answer_for_niches
 from nichechain.evolvability.question import Question
 from nichechain.execution import Executor
+from nichechain.variation.brood import Brood, litters
 
 Float32s = NDArray[np.float32]
 Ints = NDArray[np.int64]
@@ -159,37 +160,38 @@ def run_lineages(
         If a number is out of range or a niche is empty.
     """
     check_at_least(1, l=l, lineages=lineages, offspring=offspring)
-    elites = [archive.elite(int(root)).genotype for root in roots]
+    check_seed(seed)
+    elites = np.stack([archive.elite(int(root)).genotype for root in roots])
     mutate, niches = archive.mutate, archive.niches
 
-    def born(children: list[Float32s]) -> Ints:
-        evaluation = executor.evaluate(archive.domain, np.stack(children), on_done)
+    def born(children: Brood) -> Ints:
+        evaluation = executor.evaluate(archive.domain, children, on_done)
         state = np.full(len(children), NONE, np.int64)
         fine = ~evaluation.failed
         state[fine] = niches.of(evaluation.behavior[fine])
         return state
 
     states = np.full((len(elites), lineages, l), NONE, np.int64)
-    alive = [(r, u, elite) for r, elite in enumerate(elites) for u in range(lineages)]
+    # Elite and number of each lineage under way, its latest genotype, and where that stands among them.
+    elite, lineage = np.indices(states.shape[:2]).reshape(2, -1)
+    genotypes, at = elites, elite
     for generation in range(l):
-        if not alive:
+        if not elite.size:
             break
-        children = [
-            mutate(parent, keyed(seed, Purpose.LINEAGE, _birth(int(roots[r]), u, generation)))
-            for r, u, parent in alive
-        ]
+        whose = zip(elite.tolist(), lineage.tolist(), strict=True)
+        number = [_birth(int(roots[r]), u, generation) for r, u in whose]
+        seeds = (seed,) * len(genotypes)
+        children = Brood(mutate, Purpose.LINEAGE, genotypes, seeds, at, np.array(number, np.int64))
         landed = born(children)
-        for (r, u, _), state in zip(alive, landed.tolist(), strict=True):
-            states[r, u, generation] = state
-        alive = [
-            (r, u, child)
-            for (r, u, _), child, state in zip(alive, children, landed.tolist(), strict=True)
-            if state != NONE
-        ]
+        states[elite, lineage, generation] = landed
+        alive = landed != NONE
+        elite, lineage = elite[alive], lineage[alive]
+        if generation + 1 < l:
+            genotypes, at = children[alive].grow(), np.arange(len(elite))
     if niches.outside == "absorb":
         states = _absorbed(states, len(niches))
-    further = [mutate(elite, keyed(seed, Purpose.OFFSPRING, i)) for elite in elites for i in range(offspring)]
-    return Lineages(np.asarray(roots, np.int64), states, born(further).reshape(len(elites), offspring))
+    further = born(litters(mutate, Purpose.OFFSPRING, elites, seed, offspring))
+    return Lineages(np.asarray(roots, np.int64), states, further.reshape(len(elites), offspring))
 
 
 def niches_reached(states: Ints, niches: int) -> Ints:

@@ -124,8 +124,8 @@ class Regrowth:
     ) -> Iterator[Float32s]:
         """Those that are wanted, in order."""
         stored = dict(zip(self.elites.uid.tolist(), self.elites.genotype, strict=True))
-        for more in (self.pending, self.lineages):
-            stored |= dict(zip(more.uid.tolist(), more.genotype, strict=True))
+        stored |= dict(zip(self.pending.uid.tolist(), self.pending.grown(), strict=True))
+        stored |= dict(zip(self.lineages.uid.tolist(), self.lineages.genotype, strict=True))
         wanted = set(self.wanted.tolist())
         for run in self.runs:
             grown = replayed(

@@ -22,6 +22,7 @@ from nichechain.search.config import BuildConfig
 from nichechain.search.elites import Elites, SearchState
 from nichechain.search.lineages import Stretch, UnderWay
 from nichechain.search.map_elites import MapElites
+from nichechain.variation.brood import Brood
 from nichechain.verification.record import Births, Bools, Run, differs, largest_difference
 from nichechain.verification.result import SEARCH, Check
 
@@ -205,7 +206,7 @@ class _Record:
     def evaluate(
         self,
         domain: Domain,  # noqa: ARG002
-        genotypes: NDArray[np.float32],
+        genotypes: NDArray[np.float32] | Brood,
         on_done: Callable[[int], None] | None = None,
     ) -> Evaluation:
         """What became of the next births."""

@@ -23,6 +23,7 @@ from nichechain.execution import Executor, evaluate_rows
 from nichechain.landscape import niches_of, population_evolvability
 from nichechain.niches import Niches
 from nichechain.variation import Mutation
+from nichechain.variation.brood import Brood
 from nichechain.walks.config import WalkConfig, run_seed
 from nichechain.walks.diversity import NoveltyArchive, Surroundings
 from nichechain.walks.selection import Scores, draw
@@ -201,9 +202,6 @@ class Walks:
 
         rows = np.arange(walks)[:, None]
         everyone = {
-            "genotype": np.concatenate(
-                [state.genotype, offspring.genotype.reshape(walks, -1, state.genotype.shape[2])], axis=1
-            ),
             "uid": np.concatenate([state.uid, offspring.uid.reshape(walks, -1)], axis=1),
             "depth": np.concatenate([state.depth, offspring.depth.reshape(walks, -1)], axis=1),
             "niche": niche,
@@ -217,6 +215,7 @@ class Walks:
         after = WalkState(
             step=state.step + 1,
             run=state.run,
+            genotype=self._genotypes(state, offspring, chosen),
             path=path,
             archive=self._remember(state, seeds, children, failed, follows),
             stalls=state.stalls + stalled.sum(axis=1),
@@ -235,7 +234,7 @@ class Walks:
 
     def _evaluate(
         self,
-        genotypes: NDArray[np.float32],
+        genotypes: NDArray[np.float32] | Brood,
         executor: Executor | None,
         on_done: Callable[[int], None] | None = None,
     ) -> Evaluation:
@@ -249,19 +248,32 @@ class Walks:
         walks, width = state.uid.shape
         first = width + state.step * width * each
         uid = first + np.arange(width * each)
-        genotype = np.empty((walks, width * each, state.genotype.shape[2]), np.float32)
-        for walk, seed in enumerate(seeds):
-            for i, number in enumerate(uid.tolist()):
-                parent = state.genotype[walk, i // each]
-                genotype[walk, i] = self._mutate(parent, keyed(seed, Purpose.MUTATION, number))
+        brood = Brood(
+            self._mutate,
+            Purpose.MUTATION,
+            state.genotype.reshape(walks * width, -1),
+            [seed for seed in seeds for _ in range(width)],
+            np.repeat(np.arange(walks * width), each),
+            np.tile(uid, walks),
+        )
         return Offspring(
-            genotype.reshape(walks * width * each, -1),
+            brood,
             np.tile(uid, walks),
             np.repeat(state.uid.ravel(), each),
             np.repeat(state.niche.ravel(), each),
             np.repeat(state.depth.ravel() + 1, each),
             np.zeros(walks * width * each, bool),
         )
+
+    def _genotypes(self, state: WalkState, offspring: Offspring, chosen: Ints) -> NDArray[np.float32]:
+        """Those of the chosen columns (R, μ, P): only children that follow are grown here."""
+        walks, width = state.uid.shape
+        rows = np.arange(walks)[:, None]
+        genotype: NDArray[np.float32] = state.genotype[rows, np.minimum(chosen, width - 1)]
+        born = chosen >= width
+        children = rows * (len(offspring) // walks) + chosen - width
+        genotype[born] = offspring[children[born]].grown()
+        return genotype
 
     def _around(self, state: WalkState, children: Floats) -> Surroundings:
         siblings = children

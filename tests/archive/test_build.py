@@ -184,16 +184,16 @@ def test_resumes_after_an_interrupt_while_keeping(
 ) -> None:
     """Half a batch in the archive must not be committed."""
     calls = itertools.count()
-    add = elites.EliteArchive.add
+    put = elites.EliteArchive.put
 
-    def interrupted(self: Any, candidates: Any) -> Any:
-        result = add(self, candidates)
+    def interrupted(self: Any, winners: Any) -> Any:
+        result = put(self, winners)
         if next(calls) == call:
             raise KeyboardInterrupt
         return result
 
     with monkeypatch.context() as patch:
-        patch.setattr(elites.EliteArchive, "add", interrupted)
+        patch.setattr(elites.EliteArchive, "put", interrupted)
         with Threads(1) as executor, pytest.raises(KeyboardInterrupt):
             build(SHORT, tmp_path, executor, domain=RoughArm())
     assert built(tmp_path, config=SHORT) == short

@@ -9,9 +9,12 @@ from concurrent.futures import Future, ThreadPoolExecutor
 import numpy as np
 import pytest
 
+from nichechain import variation
 from nichechain.core.errors import NichechainError
-from nichechain.execution import fleet
-from nichechain.execution.fleet import Fleet, Outcome, Workbench, Worker
+from nichechain.core.randomness import Purpose
+from nichechain.execution import Threads, fleet
+from nichechain.execution.fleet import Fleet, Outcome, Rows, Workbench, Worker
+from nichechain.variation.brood import Brood
 
 from .samples import Arm, assert_same, numbered
 
@@ -56,6 +59,7 @@ class FakeFleet(Fleet):
 
 class FakeWorker(Worker):
     def __init__(self, fleet: FakeFleet) -> None:
+        super().__init__()
         self.fleet = fleet
         self.bench = Workbench(fleet.sent, fleet._cache_share)
         self.pool = ThreadPoolExecutor(1)
@@ -64,21 +68,21 @@ class FakeWorker(Worker):
         self.dead = False
         self.ready: Future[Outcome] = self.pool.submit(self.bench.prepare) if fleet.is_ready else Future()
 
-    def submit(self, genotypes: np.ndarray) -> Future[Outcome]:
+    def submit(self, rows: Rows) -> Future[Outcome]:
         with self.lock:
             self.out += 1
             self.fleet.most_out = max(self.fleet.most_out, self.out)
-        return self.pool.submit(self.work, genotypes)
+        return self.pool.submit(self.work, rows)
 
-    def work(self, genotypes: np.ndarray) -> Outcome:
-        deadly = np.isin(genotypes[:, 0], self.fleet.deadly).any()
+    def work(self, rows: Rows) -> Outcome:
+        deadly = isinstance(rows, np.ndarray) and np.isin(rows[:, 0], self.fleet.deadly).any()
         if self.dead or deadly or self.fleet.dice.random() < self.fleet.mortality:
             self.fleet.deaths += not self.dead
             self.dead = True
             raise Lost
         with self.lock:
             self.out -= 1
-        return self.bench.evaluate(genotypes)
+        return self.bench.evaluate(rows)
 
     def stop(self, *, kill: bool) -> None:
         self.pool.shutdown(wait=not kill)
@@ -105,6 +109,42 @@ def test_lost_workers_change_nothing(seed: int, monkeypatch: pytest.MonkeyPatch)
         assert executor.hired == 3 + executor.deaths
         assert len(executor._crew) == 3
     assert sum(done) == 400
+
+
+def brood(n: int, seed: int, mutate: variation.Mutation) -> Brood:
+    rng = np.random.default_rng(seed)
+    return Brood(
+        mutate,
+        Purpose.MUTATION,
+        numbered(9)[rng.permutation(9)],
+        (3,) * 9,
+        rng.integers(9, size=n),
+        np.arange(n) + 1000 * seed,
+    )
+
+
+@pytest.mark.parametrize("mortality", [0.0, 0.2])
+def test_workers_grow_children_to_the_bit(mortality: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("nichechain.execution.pieces.LOSSES", 1000)
+    domain = Arm()
+    with FakeFleet(3, mortality) as executor:
+        for number, scale in enumerate([1.0, 1.0, 0.1, 1.0]):
+            children = brood(200, number, variation.cauchy(scale))
+            done: list[int] = []
+            found = executor.evaluate(domain, children, done.append)
+            assert_same(found, Arm().evaluate(children.grow()))
+            assert sum(done) == 200
+        assert (executor.deaths > 3) == (mortality > 0)
+
+
+def test_a_mutation_that_raises_is_not_the_genotypes_doing() -> None:
+    def broken(_parent: np.ndarray, _rng: np.random.Generator) -> np.ndarray:
+        raise ArithmeticError("no such step")
+
+    with FakeFleet(2) as executor, pytest.raises(ArithmeticError, match="no such step"):
+        executor.evaluate(Arm(), brood(20, 0, broken))
+    with Threads(2) as threads, pytest.raises(ArithmeticError, match="no such step"):
+        threads.evaluate(Arm(), brood(20, 0, broken))
 
 
 @pytest.mark.parametrize("size", [1, 2, 5])
