@@ -122,9 +122,17 @@ class BaseMeasure:
 
     def rows(self, parent: Ints) -> Floats:
         """Whole rows B_i, (N, S)."""
-        states = np.arange(self.niches.states)
-        pairs = np.repeat(parent, states.size), np.tile(states, parent.size)
-        mixed = (self.weights @ self.components(*pairs)).reshape(parent.size, states.size)
+        n, states = len(self.niches), self.niches.states
+        anywhere, displaced, uniform = self.weights
+        mixed = np.empty((parent.size, states))
+        mixed[:] = anywhere * self.destination + uniform / states
+        inside = parent < n
+        places = parent[inside]
+        share = (displaced * (1.0 - self.leaving) / self.within[places])[:, None]
+        moved = np.full((places.size, states), displaced * self.leaving)
+        moved[:, :n] = share * self.displacement.rows(places)
+        mixed[inside] += moved
+        mixed[~inside] += displaced * self.destination
         if self.near is not None and parent.size:
             mixed *= self.shared[parent, None]
             mixed += self.near[parent].toarray()

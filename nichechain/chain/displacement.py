@@ -8,8 +8,7 @@ from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import fft, sparse
-from scipy.signal import fftconvolve
+from scipy import sparse
 
 from nichechain.core.row_sampler import RowSampler
 from nichechain.niches import GridNiches
@@ -34,8 +33,8 @@ class Displacement(Protocol):
         """K_ij of some pairs of niches, (N,)."""
         ...
 
-    def row(self, niche: int) -> Floats:
-        """K_ij of one parent, (n,)."""
+    def rows(self, parent: Ints) -> Floats:
+        """K_ij of some parents and all children, (N, n)."""
         ...
 
     def to_parents(self, values: Floats) -> Floats:
@@ -85,10 +84,9 @@ class GridDisplacement:
     @cached_property
     def within(self) -> Floats:
         """Share of the kernel that stays in the grid, for a parent in each niche, (n,)."""
-        # Correlation of the kernel with the grid's indicator.
-        flipped = np.flip(self.kernel)
-        stays = fftconvolve(flipped, np.ones(self.niches.shape), mode="valid")
-        within: Floats = np.maximum(stays.ravel(), self.kernel[tuple(k - 1 for k in self.niches.shape)])
+        stays = self.to_parents(np.ones((1, len(self.niches))))[0]
+        # What stays where it is is left by rounding, too.
+        within: Floats = np.maximum(stays, self.kernel[tuple(k - 1 for k in self.niches.shape)])
         return within
 
     def at(self, parent: Ints, child: Ints) -> Floats:
@@ -96,12 +94,14 @@ class GridDisplacement:
         found: Floats = self.kernel[_cells_apart(self.niches, parent, child)]
         return found
 
-    def row(self, niche: int) -> Floats:
-        """K_ij of one parent, (n,)."""
+    def rows(self, parent: Ints) -> Floats:
+        """K_ij of some parents and all children, (N, n)."""
         shape = self.niches.shape
-        start = np.unravel_index(niche, shape)
-        seen = tuple(slice(k - 1 - i, 2 * k - 1 - i) for i, k in zip(start, shape, strict=True))
-        found: Floats = self.kernel[seen].ravel()
+        # The grid as it lies around a parent is a window of the kernel.
+        windows = np.lib.stride_tricks.sliding_window_view(self.kernel, shape)
+        start = np.unravel_index(parent, shape)
+        seen = tuple(k - 1 - i for i, k in zip(start, shape, strict=True))
+        found: Floats = windows[seen].reshape(parent.size, -1)
         return found
 
     def to_parents(self, values: Floats) -> Floats:
@@ -139,7 +139,7 @@ class GridDisplacement:
     @property
     def _padded(self) -> list[int]:
         # No displacement within the grid wraps around a torus of this size onto another cell.
-        return [fft.next_fast_len(side, real=True) for side in self.kernel.shape]
+        return [_fast(side) for side in self.kernel.shape]
 
     @cached_property
     def _spectrum(self) -> NDArray[np.complex128]:
@@ -147,18 +147,27 @@ class GridDisplacement:
         torus = np.zeros(self._padded)
         torus[tuple(slice(side) for side in self.kernel.shape)] = np.flip(self.kernel)
         torus = np.roll(torus, [1 - k for k in self.niches.shape], axis=tuple(range(torus.ndim)))
-        transformed: NDArray[np.complex128] = fft.rfftn(torus)
+        transformed: NDArray[np.complex128] = np.fft.rfftn(torus)
         return transformed
 
     def _moved(self, values: Floats, spectrum: NDArray[np.complex128]) -> Floats:
         """Each row of values (c, n) correlated or convolved with the kernel, on the grid."""
         shape = self.niches.shape
         axes = tuple(range(1, len(shape) + 1))
-        moved = fft.rfftn(values.reshape(-1, *shape), self._padded, axes=axes)
+        moved = np.fft.rfftn(values.reshape(-1, *shape), self._padded, axes=axes)
         moved *= spectrum
-        whole = fft.irfftn(moved, self._padded, axes=axes, overwrite_x=True)
+        whole = np.fft.irfftn(moved, self._padded, axes=axes)
         within: Floats = whole[(slice(None), *(slice(k) for k in shape))]
         return within.reshape(len(values), -1)
+
+
+def _fast(side: int) -> int:
+    """The least length from this one on that has no prime factor above 5, which transforms take quickly."""
+    rest = side
+    for prime in (2, 3, 5):
+        while rest % prime == 0:
+            rest //= prime
+    return side if rest == 1 else _fast(side + 1)
 
 
 def _cells_apart(niches: GridNiches, parent: Ints, child: Ints) -> tuple[Ints, ...]:

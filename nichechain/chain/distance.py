@@ -84,16 +84,15 @@ class DistanceDisplacement:
         found: Floats = self.rate[_shell(self.niches, parent, child, self.width)]
         return found
 
-    def row(self, niche: int) -> Floats:
-        """K_ij of one parent, (n,)."""
-        found: Floats = self._rows(np.array([niche]))[0]
-        return found
+    def rows(self, parent: Ints) -> Floats:
+        """K_ij of some parents and all children, (N, n)."""
+        return self._made(parent) if self._whole is None else self._whole[parent]
 
     def to_parents(self, values: Floats) -> Floats:
         """Σ_j K_ij x_j for each row x of values (c, n); K is symmetric."""
         moved = np.empty_like(values)
         for rows in _blocks(len(self.niches)):
-            moved[:, rows] = values @ self._rows(rows).T
+            moved[:, rows] = values @ self.rows(rows).T
         return moved
 
     def to_children(self, values: Floats) -> Floats:
@@ -111,7 +110,7 @@ class DistanceDisplacement:
             if not here.size:
                 continue
             own, which = np.unique(parent[here], return_inverse=True)
-            upto = np.cumsum(self._rows(own), axis=1)
+            upto = np.cumsum(self.rows(own), axis=1)
             # One sorted sequence of all rows: a search in it is a search in the parent's row.
             upto = upto / upto[:, -1:] + np.arange(own.size)[:, None]
             found = np.searchsorted(upto.ravel(), chance[here] + which, side="right")
@@ -136,11 +135,8 @@ class DistanceDisplacement:
         n = len(self.niches)
         last = np.empty(n, np.int64)
         for rows in _blocks(n):
-            last[rows] = n - 1 - np.argmax(self._rows(rows)[:, ::-1] > 0, axis=1)
+            last[rows] = n - 1 - np.argmax(self.rows(rows)[:, ::-1] > 0, axis=1)
         return last
-
-    def _rows(self, niches: Ints) -> Floats:
-        return self._made(niches) if self._whole is None else self._whole[niches]
 
     def _made(self, niches: Ints) -> Floats:
         made: Floats = self.rate[_away(self.niches.centers, niches, np.arange(len(self.niches)), self.width)]

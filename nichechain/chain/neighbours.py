@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import cached_property
 from itertools import product
 
 import numpy as np
@@ -66,12 +67,21 @@ class Neighbours:
         """The same for all pairs of states, times the weight of either kind, (S, S)."""
         parts = []
         for kind, births in enumerate((landing, moving)):
-            kept = self._inside[kind]
-            index = self._row[kept], self._column[kind][kept]
-            parts.append((weights[kind] * self._share(kind, births)[kept], index))
-        data = np.concatenate([part[0] for part in parts])
-        row, column = (np.concatenate([part[1][k] for part in parts]) for k in range(2))
-        return sparse.coo_array((data, (row, column)), shape=(self._states, self._states)).tocsr()
+            parts.append(weights[kind] * self._share(kind, births)[self._inside[kind]])
+        entry, column, start = self._entries
+        data = np.bincount(entry, np.concatenate(parts), column.size)
+        return sparse.csr_array((data, column, start), shape=(self._states, self._states))
+
+    @cached_property
+    def _entries(self) -> tuple[Ints, Ints, Ints]:
+        """Where in a sparse matrix the words of either kind add up; its columns, and starts of rows."""
+        said = [
+            self._row[kept] * self._states + column[kept]
+            for kept, column in zip(self._inside, self._column, strict=True)
+        ]
+        code, entry = np.unique(np.concatenate(said), return_inverse=True)
+        start = np.searchsorted(code, np.arange(self._states + 1) * self._states)
+        return entry, code % self._states, start
 
     def _share(self, kind: int, births: Floats) -> Floats:
         told = self._weight * births[self._birth] * self._inside[kind]

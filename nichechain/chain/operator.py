@@ -135,7 +135,7 @@ class PooledTransition:
         whole += self.shares @ self.pools
         for row in np.flatnonzero(self.spread):
             assert self.displacement is not None
-            near = self.displacement.row(int(self.cell[row]))
+            near = self.displacement.rows(self.cell[[row]])[0]
             whole[row, : near.size] += self.spread[row] * near
         return whole
 

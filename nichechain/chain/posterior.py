@@ -125,7 +125,7 @@ class DirichletPosterior:
             return self._draw_atoms(known, (rows, columns, share), rng)
         # In a row of few states, gamma variates of tiny shape would all underflow.
         if pieces >= max(states, _FEW_STATES):
-            return sparse.csr_array(self._draw_whole_rows(known, (rows, columns, share), rng))
+            return _full(self._draw_whole_rows(known, (rows, columns, share), rng))
         # Each piece leaves U^(1/s) of what it was broken from: minus its logarithm is exponential.
         left = np.ones((states, pieces + 1))
         np.cumsum(rng.standard_exponential((states, pieces - 1)), axis=1, out=left[:, 1:-1])
@@ -201,6 +201,13 @@ class DirichletPosterior:
         if self.strength > states:
             return max(states, _FEW_STATES)
         return 1 + math.ceil(math.log(_REMAINDER) / math.log(self.strength / (1.0 + self.strength)))
+
+
+def _full(dense: Floats) -> sparse.csr_array:
+    """A matrix without zeros worth looking for, as a sparse one."""
+    rows, columns = dense.shape
+    starts = np.arange(rows + 1) * columns
+    return sparse.csr_array((dense.ravel(), np.tile(np.arange(columns), rows), starts), shape=dense.shape)
 
 
 def _collected(data: Floats, index: tuple[Ints, Ints], states: int) -> sparse.csr_array:

@@ -46,6 +46,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     from nichechain.cli import streams
 
+    # Products of some hundred states are small for threads, and those of OpenBLAS wait for each other in a
+    # loop: on a busy machine that takes seven times as long. Only what NumPy finds at its import counts.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     with streams.prepared():
         return _run(list(sys.argv[1:] if arguments is None else arguments))
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator
 from typing import Protocol
 
@@ -111,13 +112,13 @@ def visit_probabilities(
     states = transition.shape[0]
     niches = _counted(counted, states)
     check_at_least(1, columns=columns)
-    transition = _faster(transition)
+    transition, first = _faster(transition), _faster(first)
     for start in range(0, niches, columns):
         targets = np.arange(start, min(start + columns, niches))
         hit = np.zeros((states, targets.size))
         hit[targets, targets - start] = 1.0
-        for _ in range(steps - 1):
-            hit = transition @ hit
+        for step in range(steps - 1):
+            hit = _columns(transition, hit, targets) if step == 0 else transition @ hit
             # A lineage that stands on its target has visited it, wherever it goes next.
             hit[targets, targets - start] = 1.0
         yield targets, first @ hit
@@ -165,7 +166,7 @@ def coverage_by_generation(
         hit = np.zeros((transition.shape[0], targets.size))
         hit[targets, targets - start] = 1.0
         for step in range(longest):
-            hit = transition @ hit
+            hit = _columns(transition, hit, targets) if step == 0 else transition @ hit
             for k, some in enumerate(at_least_once(hit[states], sizes)):
                 found[:, step, k] += some.sum(axis=1)
             # A lineage that stands on its target has visited it, wherever it goes next.
@@ -340,9 +341,16 @@ def _counted(counted: int | None, states: int) -> int:
     return counted
 
 
+def _columns(transition: LinearOperator, unit: Floats, targets: Ints) -> Floats:
+    """Neighbouring columns of T, (S, c): its product with the unit vectors of these targets."""
+    if isinstance(transition, np.ndarray):
+        return transition[:, targets[0] : targets[-1] + 1].copy()
+    return transition @ unit
+
+
 def _faster(transition: LinearOperator) -> LinearOperator:
     """The matrix in the form that multiplies faster."""
-    if sparse.issparse(transition) and transition.nnz > _DENSE * transition.shape[0] ** 2:  # type: ignore[attr-defined]
+    if sparse.issparse(transition) and transition.nnz > _DENSE * math.prod(transition.shape):  # type: ignore[attr-defined]
         dense: Floats = transition.toarray()  # type: ignore[attr-defined]
         return dense
     return transition

@@ -14,7 +14,6 @@ from nichechain.chain.operator import PooledTransition
 from nichechain.core.intervals import drawn_interval
 from nichechain.evolvability.coverage import at_least_once, visit_probabilities
 from nichechain.evolvability.question import DRAWS, Convention, Question, Root
-from nichechain.evolvability.returns import return_probabilities
 from nichechain.niches import Niche
 
 Floats = NDArray[np.float64]
@@ -191,6 +190,8 @@ def visit_probability(transition: Transition, first: Floats, steps: int) -> tupl
     # States first reached in the last step cannot be returned to.
     again = np.flatnonzero(arrival < steps - 1)
     if again.size:
+        from nichechain.evolvability.returns import return_probabilities
+
         # Some state is occupied at once, so the longest return wanted is as long as the walk.
         returns = return_probabilities(rows, again, steps - 1 - arrival[again])
         for k in range(1, steps):

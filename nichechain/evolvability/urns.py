@@ -11,9 +11,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
@@ -152,100 +151,33 @@ class Urns:
 
     def walks(self, first: Ints, moves: int, rng: np.random.Generator) -> Ints:
         """States of lineages of some roots (g, M), generation after generation: (g, (moves + 1) M)."""
+        from nichechain.evolvability import urn_steps
+
         g, lineages = first.shape
         states = np.empty((g, (moves + 1) * lineages), np.int64)
         states[:, :lineages] = first
         tables = self._start, self._column, self._upto, self._strength, self._stays
         for move in range(moves):
             origin = np.empty((g, lineages), np.int64)
-            _choose(*tables, states, move * lineages, rng.random((g, lineages)), origin)
+            urn_steps.choose(*tables, states, move * lineages, rng.random((g, lineages)), origin)
             new = origin == _ABSENT
             here = states[:, move * lineages : (move + 1) * lineages]
             fresh = np.empty((g, lineages), np.int64)
             fresh[new] = self._base.sample(here[new], rng)
-            _resolve(origin, fresh, states, (move + 1) * lineages)
+            urn_steps.resolve(origin, fresh, states, (move + 1) * lineages)
         return states
-
-
-@numba.njit(nogil=True, cache=True)
-def _choose(
-    start: Any,
-    column: Any,
-    upto: Any,
-    strength: Any,
-    stays: Any,
-    states: Any,
-    done: Any,
-    uniform: Any,
-    origin: Any,
-) -> None:
-    """Where each child of the generation that begins at ``done`` comes from.
-
-    -1: from the base measure; -2 - j: as a birth in state j; else a copy of the child of the visit of
-    that number.
-    """
-    g, lineages = uniform.shape
-    size = start.size - 1
-    last, times = np.full(size, -1), np.zeros(size, np.int64)
-    before = np.empty(done + lineages, np.int64)
-    for root in range(g):
-        for visit in range(done):
-            state = states[root, visit]
-            before[visit] = last[state]
-            last[state] = visit
-            times[state] += 1
-        for k in range(lineages):
-            visit = done + k
-            state = states[root, visit]
-            if state == stays:
-                origin[root, k] = -2 - state
-                continue
-            begin, end = start[state], start[state + 1]
-            known = upto[end] - upto[begin]
-            place = uniform[root, k] * (strength + known + times[state])
-            if place < known:
-                at = begin + np.searchsorted(upto[begin + 1 : end + 1], upto[begin] + place, "right")
-                origin[root, k] = -2 - column[min(at, end - 1)]
-            elif place < known + times[state]:
-                back = min(np.int64(place - known), times[state] - 1)
-                at = last[state]
-                for _ in range(back):
-                    at = before[at]
-                origin[root, k] = at
-            else:
-                origin[root, k] = -1
-            before[visit] = last[state]
-            last[state] = visit
-            times[state] += 1
-        for visit in range(done + lineages):
-            state = states[root, visit]
-            last[state] = -1
-            times[state] = 0
-
-
-@numba.njit(nogil=True, cache=True)
-def _resolve(origin: Any, fresh: Any, states: Any, done: Any) -> None:
-    """The children: that of visit v is in place v + M, M after its parent."""
-    g, lineages = origin.shape
-    for root in range(g):
-        for k in range(lineages):
-            source = origin[root, k]
-            if source == -1:
-                states[root, done + k] = fresh[root, k]
-            elif source < -1:
-                states[root, done + k] = -2 - source
-            else:
-                states[root, done + k] = states[root, source + lineages]
 
 
 def _covered(states: Ints, lineages: int, sizes: list[int], niches: int) -> tuple[Floats, Floats]:
     """Niches visited by U of M lineages, and its variance as two halves tell it: (g, k) each."""
+    from nichechain.evolvability import urn_steps
+
     half = lineages // 2
     tables = [
         np.stack([hit_probabilities(whole, size) for size in sizes])
         for whole in (lineages, half, lineages - half)
     ]
-    whole, first, second = _count(states, lineages, half, niches, *tables)
+    whole, first, second = urn_steps.count(states, lineages, half, niches, *tables)
     return whole, (first - second) ** 2 / 4.0
 
 
@@ -254,36 +186,3 @@ def hit_probabilities(lineages: int, size: int) -> Floats:
     missed = np.arange(lineages)
     left = np.maximum(lineages - size - missed, 0) / (lineages - missed)
     return np.concatenate([[0.0], 1.0 - np.cumprod(left)])
-
-
-@numba.njit(nogil=True, cache=True)
-def _count(states: Any, lineages: Any, half: Any, niches: Any, whole: Any, early: Any, late: Any) -> Any:
-    g, visits = states.shape
-    sizes = whole.shape[0]
-    found = np.zeros((3, g, sizes))
-    seen = np.full(niches, -1)
-    number = np.zeros((niches, 2), np.int64)
-    places = np.empty(visits, np.int64)
-    for root in range(g):
-        used = 0
-        for lineage in range(lineages):
-            side = 0 if lineage < half else 1
-            for visit in range(lineage, visits, lineages):
-                state = states[root, visit]
-                if state >= niches or seen[state] == lineage:
-                    continue
-                seen[state] = lineage
-                if number[state, 0] + number[state, 1] == 0:
-                    places[used] = state
-                    used += 1
-                number[state, side] += 1
-        for place in range(used):
-            state = places[place]
-            a, b = number[state]
-            for k in range(sizes):
-                found[0, root, k] += whole[k, a + b]
-                found[1, root, k] += early[k, a]
-                found[2, root, k] += late[k, b]
-            number[state] = 0
-            seen[state] = -1
-    return found[0], found[1], found[2]

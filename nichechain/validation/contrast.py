@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 import pyarrow as pa
 from numpy.typing import NDArray
-from scipy import stats
+from scipy.special import stdtrit
 
 from nichechain.births.joins import across_runs
 from nichechain.births.table import NONE, check_columns
@@ -205,7 +205,7 @@ def contrast(
         freedom.append(side.clusters - 1)
     difference = values[1] - values[0]
     error = np.sqrt(spreads[0] + spreads[1])
-    quantile = float(stats.t.ppf(0.5 + _LEVEL / 2, max(1, min(freedom))))
+    quantile = float(stdtrit(max(1, min(freedom)), 0.5 + _LEVEL / 2))
     rows = tuple(
         ContrastRow(
             name, float(a), float(b), float(d), float(e), float(d - quantile * e), float(d + quantile * e)

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
-from scipy import stats
+from scipy.special import stdtrit
 
 from nichechain.births.table import NONE
 from nichechain.chain.model import NicheChain
@@ -103,7 +103,7 @@ class DirectCheck:
                 ideal = _spearmans(prediction.simulated[:, k], value)
                 spearman_low, spearman_high = drawn_interval(ideal)
                 bias = value - real
-                width = stats.t.ppf(0.975, bias.size - 1) * bias.std(ddof=1) / np.sqrt(bias.size)
+                width = stdtrit(bias.size - 1, 0.975) * bias.std(ddof=1) / np.sqrt(bias.size)
                 rows.append(
                     {
                         "start": prediction.start,
@@ -214,8 +214,10 @@ def compare(
 
 def _spearmans(real: NDArray[np.int64], value: Floats) -> Floats:
     """Rank correlation of each column of (R, K) with (R,); NaN where either is constant."""
-    x = stats.rankdata(value)
-    y = stats.rankdata(real, axis=0)
+    from scipy.stats import rankdata
+
+    x = rankdata(value)
+    y = rankdata(real, axis=0)
     x = x - x.mean()
     y = y - y.mean(axis=0)
     with np.errstate(invalid="ignore", divide="ignore"):

@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd
 import pyarrow as pa
 from numpy.typing import NDArray
-from scipy import stats
+from scipy.special import stdtrit
 
 from nichechain.births.table import check_columns
 from nichechain.chain.counts import TransitionCounts
@@ -176,7 +176,7 @@ def level_drift(
     early, late = (_levels(half, compared, question, number) for number, half in enumerate(halves))
     difference = float(late.mean() - early.mean())
     spread = np.sqrt((early.var(ddof=1) + late.var(ddof=1)) * (1.0 + 1.0 / draws))
-    width = float(stats.t.ppf(0.5 + _LEVEL / 2, 2 * (draws - 1)) * spread)
+    width = float(stdtrit(2 * (draws - 1), 0.5 + _LEVEL / 2) * spread)
     return LevelDrift(
         float(early.mean()),
         float(late.mean()),
@@ -254,7 +254,7 @@ def level_course(
 def _interval(levels: Floats) -> tuple[float, float, float]:
     """Mean of a few draws and a 90 % interval."""
     size, mean = levels.size, float(levels.mean())
-    width = stats.t.ppf(0.5 + _LEVEL / 2, size - 1) * levels.std(ddof=1) * np.sqrt(1.0 + 1.0 / size)
+    width = stdtrit(size - 1, 0.5 + _LEVEL / 2) * levels.std(ddof=1) * np.sqrt(1.0 + 1.0 / size)
     return mean, mean - float(width), mean + float(width)
 
 

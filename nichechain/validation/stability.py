@@ -9,7 +9,6 @@ from typing import Literal, get_args
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
-from scipy.stats import spearmanr
 
 from nichechain.births.families import elites_of, tabulated
 from nichechain.chain.counts import TransitionCounts
@@ -255,4 +254,6 @@ def _agreement(first: Floats, second: Floats) -> float:
     """Spearman's rank correlation; 0 where one side ranks nothing above anything."""
     if np.ptp(first) == 0 or np.ptp(second) == 0:
         return 0.0
+    from scipy.stats import spearmanr
+
     return float(spearmanr(first, second).statistic)

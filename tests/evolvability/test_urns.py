@@ -77,11 +77,12 @@ def test_offspring_begin_where_they_are():
 
 def test_as_many_lineages_as_there_are_count_as_they_are():
     # Of all M lineages, M are drawn: rarefaction changes nothing.
-    from nichechain.evolvability.urns import _count, hit_probabilities
+    from nichechain.evolvability.urn_steps import count
+    from nichechain.evolvability.urns import hit_probabilities
 
     states = np.array([[0, 1, 1, 2, 2, 1, 5, 2]])  # two generations of four lineages; 5 is no niche
     tables = [np.stack([hit_probabilities(m, u) for u in (1, 2)]) for m in (4, 2, 2)]
-    whole, first, second = _count(states, 4, 2, 5, *tables)
+    whole, first, second = count(states, 4, 2, 5, *tables)
     # Lineages visit {0, 2}, {1}, {1, 5} and {2}.
     assert whole[0, 0] == pytest.approx((2 + 1 + 1 + 1) / 4)
     assert whole[0, 1] == pytest.approx(np.mean([3, 3, 2, 1, 2, 2]))

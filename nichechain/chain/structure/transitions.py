@@ -54,7 +54,7 @@ def entries_above(chain: NicheChain, threshold: float) -> sparse.csr_array:
         pairs.append(np.stack([starts, many[column]]))
     for row in np.flatnonzero(rows.spread).tolist():
         assert rows.displacement is not None
-        near = np.flatnonzero(rows.displacement.row(int(rows.cell[row])) > least / rows.spread[row])
+        near = np.flatnonzero(rows.displacement.rows(rows.cell[[row]])[0] > least / rows.spread[row])
         pairs.append(np.stack([np.full(near.size, row), near]))
     places = np.concatenate(pairs, axis=1)
     parent, child = np.divmod(np.unique(places[0] * chain.states + places[1]), chain.states)
