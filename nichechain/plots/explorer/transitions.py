@@ -127,7 +127,7 @@ def _spelled_out(whole: PooledTransition) -> PooledTransition:
     assert whole.displacement is not None
     near = np.zeros(whole.shape)
     for row in np.flatnonzero(whole.spread):
-        there = whole.displacement.row(int(whole.cell[row]))
+        there = whole.displacement.rows(whole.cell[[row]])[0]
         near[row, : there.size] = whole.spread[row] * there
     kept = sparse.csr_array(whole.kept + sparse.csr_array(near))
     return replace(whole, kept=kept, spread=np.zeros(whole.spread.size), displacement=None)
