@@ -24,7 +24,8 @@ from nichechain.search.config import MOST_FAILED, BuildConfig
 from nichechain.search.failures import Failures, check_first_batch
 from nichechain.search.making import make_domain, make_mutation, make_niches
 from nichechain.search.map_elites import MapElites
-from nichechain.search.parents import CuriosityScores
+from nichechain.search.selection import Told, retrace
+from nichechain.steering import make_selection
 
 
 def build(
@@ -71,7 +72,7 @@ def build(
     domain = domain or make_domain(config)
     domain, mutate = make_mutation(config, domain)
     with writing(folder):
-        state = scores = None
+        state = None
         outside = 0
         if read.is_archive(folder):
             meta = read.read_meta(folder)
@@ -85,16 +86,18 @@ def build(
             _check_continues(meta.config, config, meta.births, folder)
             niches = read.read_niches(folder, meta)
             state = read.read_state(folder, meta)
-            curious = config.selection == "curiosity"
-            rows = read.read_births(folder, meta, None if curious else ["child_niche", "failed"])
-            if curious:
-                scores = CuriosityScores.of_births(rows)
+            selection = make_selection(config, niches)
+            told = config.selection != "uniform"
+            rows = read.read_births(folder, meta, None if told else ["child_niche", "failed"])
+            if told:
+                retrace(selection, Told.of(rows))
             outside = count(rows, len(niches))
             failures.count(rows)
             del rows
         else:
             niches = make_niches(config)
-        search = MapElites(domain, niches, mutate, config, state, scores)
+            selection = make_selection(config, niches)
+        search = MapElites(domain, niches, mutate, config, state, selection)
         search.savings = savings.read(folder) if state is not None else search.savings
         writer = write.Writer(folder, config, read.DomainFacts.of(domain), niches=niches)
 

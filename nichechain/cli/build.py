@@ -65,6 +65,14 @@ class BuildCommand(SearchConfig):
         parsing.parsed("--layer-scales", _layer_scales),
     ] = ()
     """Factor on the scale in each layer of the controller, such as 1,0.5,0.5."""
+    selection: Annotated[str, parsing.option("NAME", "uniform")] = "uniform"
+    """How parents are drawn from the elites: uniform, each alike; curiosity, whose children enter;
+    reach, whose descendants would fill niches, as the chain of the births so far foretells (drawn
+    uniformly until there are births); or a mixture such as reach:0.7,uniform:0.3."""
+    temperature: Annotated[
+        float | None, parsing.option("T", "1, and 0.3 for a selection that asks the chain")
+    ] = None
+    """Elites are drawn in proportion to w^(1/T), for w what the selection says of each."""
     grid: Annotated[str | None, parsing.option("NXxNY", _GRID)] = None
     """Cells of the grid along each axis of behavior."""
     niches: Annotated[str | None, parsing.option("cvt:N", "a grid")] = None

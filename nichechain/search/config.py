@@ -5,7 +5,7 @@ from __future__ import annotations
 import operator
 from collections.abc import Mapping
 from dataclasses import KW_ONLY, MISSING, asdict, dataclass, field, fields
-from typing import Any, Literal, get_args
+from typing import Any, Literal, cast, get_args
 
 from nichechain.core.checks import (
     DomainOption,
@@ -15,6 +15,7 @@ from nichechain.core.checks import (
     check_at_least,
     check_choice,
     check_numbers,
+    check_positive,
     plain_options,
 )
 from nichechain.core.errors import NichechainError
@@ -24,7 +25,9 @@ Replacement = Literal["random", "first", "newest", "objective"]
 Outside = Literal["state", "absorb", "clip"]
 NichesKind = Literal["grid", "cvt"]
 MutationName = Literal["cauchy", "gaussian", "student-t", "uniform-ball"]
-Selection = Literal["uniform", "curiosity"]
+SelectionName = Literal["uniform", "curiosity", "reach"]
+
+_MIXTURE = "'reach:0.7,uniform:0.3'"
 
 MOST_FAILED = 0.5
 """Share of births that may fail before a run is stopped, unless told otherwise."""
@@ -61,8 +64,17 @@ class SearchConfig:
     self_adaptive : bool
         Step sizes are genes, which mutate too and are used before the weights: one per layer that
         has a layer scale, or else one for all weights. They begin at the scale.
-    selection : {"uniform", "curiosity"}
-        How parents are drawn from the elites: each alike, or by curiosity, whose children enter.
+    selection : str
+        How parents are drawn from the elites: ``uniform``, each alike; ``curiosity``, whose children
+        enter; ``reach``, whose descendants would fill niches, as the chain foretells, see
+        :mod:`nichechain.steering`; or a mixture such as ``reach:0.7,uniform:0.3``.
+    temperature : float, optional
+        Elites are drawn in proportion to w^(1/temperature), for w what the selection says of each;
+        by default 1, and 0.3 for a selection that asks the chain.
+    selection_l : int
+        Generations of the lineages that a selection asks the chain about.
+    selection_lineages : int
+        How many lineages it asks about.
     lineage_share : float
         Share of the births that unselected lineages get, whose parents are their own latest births:
         they show what lineages do. With 0 all parents are selected.
@@ -91,7 +103,10 @@ class SearchConfig:
     step_bound: tuple[StepBound, float] | None = None
     layer_scales: tuple[float, ...] = ()
     self_adaptive: bool = False
-    selection: Selection = "uniform"
+    selection: str = "uniform"
+    temperature: float | None = None
+    selection_l: int = 1
+    selection_lineages: int = 1
     lineage_share: float = 0.05
     lineage_length: int = 10
     replacement: Replacement = "random"
@@ -137,7 +152,10 @@ class BuildConfig(SearchConfig):
     domain_options: Mapping[str, DomainOption] = field(default_factory=dict, hash=False)
 
     def __post_init__(self) -> None:
-        whole = ("evaluations", "initial", "batch", "seed", "domain_seed", "niches_seed", "lineage_length")
+        whole = (
+            *("evaluations", "initial", "batch", "seed", "domain_seed", "niches_seed", "lineage_length"),
+            *("selection_l", "selection_lineages"),
+        )
         for name in whole:
             try:
                 # Numbers of NumPy become plain ones, which JSON can hold.
@@ -180,7 +198,11 @@ class BuildConfig(SearchConfig):
             raise NichechainError(
                 f"shape is {self.shape}, but a tessellation has one number of niches, such as (400,)"
             )
-        check_choice("selection", self.selection, get_args(Selection))
+        parse_selection(self.selection)
+        check_at_least(1, selection_l=self.selection_l, selection_lineages=self.selection_lineages)
+        if self.temperature is not None:
+            check_positive(temperature=self.temperature)
+            object.__setattr__(self, "temperature", float(self.temperature))
 
     def to_json(self) -> dict[str, Any]:
         """Plain values for JSON; as before grids had an epsilon, where it is the usual one."""
@@ -207,3 +229,36 @@ class BuildConfig(SearchConfig):
             )
         # Before there were lineages, builds had none.
         return cls(**{"lineage_share": 0.0, **values})
+
+
+def parse_selection(text: str) -> tuple[tuple[SelectionName, float], ...]:
+    """Names of selections and their shares: of ``reach``, or of a mixture ``reach:0.7,uniform:0.3``.
+
+    Raises
+    ------
+    NichechainError
+        If a name is unknown or comes twice, or the shares are no shares that sum to 1.
+    """
+    if not isinstance(text, str):
+        raise NichechainError(f"selection is {text!r}, but must be a name, or a mixture as {_MIXTURE}")
+    parts = [part.strip().partition(":") for part in text.split(",")]
+    for name, _, _ in parts:
+        check_choice("selection", name, get_args(SelectionName))
+    if len(parts) == 1 and not parts[0][1]:
+        return ((cast(SelectionName, parts[0][0]), 1.0),)
+    names = [name for name, _, _ in parts]
+    shares = []
+    for name, _, share in parts:
+        try:
+            shares.append(float(share))
+        except ValueError:
+            raise NichechainError(
+                f"selection is {text!r}, but the share of {name} must be a number, as in {_MIXTURE}"
+            ) from None
+    if len(set(names)) < len(names):
+        raise NichechainError(f"selection is {text!r}, but must name each of its parts once")
+    if not all(share > 0 for share in shares) or abs(sum(shares) - 1.0) > 1e-9:
+        raise NichechainError(
+            f"selection is {text!r}, but its shares must be above 0 and sum to 1, as in {_MIXTURE}"
+        )
+    return tuple((cast(SelectionName, name), share) for name, share in zip(names, shares, strict=True))

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from nichechain.births.table import Offspring
+from nichechain.births.table import NONE, Offspring
 from nichechain.core.columns import Columnar
 from nichechain.domains.base import Domain
 from nichechain.niches import Niches
@@ -98,6 +98,7 @@ class EliteArchive:
         )
         self._outside: Elites | None = None
         self._largest_key = [-np.inf] * (len(niches) + 1)
+        self._uid = np.full(len(niches) + 1, NONE, np.int64)
 
     @property
     def filled(self) -> int:
@@ -130,6 +131,7 @@ class EliteArchive:
 
         pyribs gets only those in the grid: it would put the others in edge cells without a word.
         """
+        self._uid[winners.niche] = winners.uid
         inside = winners[winners.niche < len(self._niches)]
         if len(inside):
             self._grid.add(
@@ -148,6 +150,10 @@ class EliteArchive:
         """States that have an elite, sorted."""
         inside = np.sort(self._grid.data("index")).astype(np.int64)
         return inside if self._outside is None else np.append(inside, len(self._niches))
+
+    def uids(self, state: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Number of the elite of each of some occupied states."""
+        return self._uid[state]
 
     def elites(self, state: NDArray[np.int64]) -> Elites:
         """The elite of each of some occupied states, which may repeat."""

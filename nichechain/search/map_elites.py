@@ -28,8 +28,8 @@ from nichechain.niches import Niches
 from nichechain.search.config import BuildConfig
 from nichechain.search.elites import EliteArchive, Elites, SearchState
 from nichechain.search.lineages import Stretch, UnderWay
-from nichechain.search.parents import CuriosityScores, draw_curious
 from nichechain.search.savings import Savings
+from nichechain.search.selection import ParentSelection, Told, UniformParents, draw_parents
 from nichechain.variation import Mutation
 from nichechain.variation.brood import Brood
 
@@ -47,8 +47,8 @@ class MapElites:
     config : BuildConfig
     state : SearchState, optional
         Where to go on from; by default from the start.
-    curiosity : CuriosityScores, optional
-        Scores after the births so far, where parents are selected by them and there is a state.
+    selection : ParentSelection, optional
+        How parents are drawn, having been told of the births so far; by default each elite alike.
     stretch : Stretch, optional
         The steps to come, by default those of the build.
 
@@ -66,7 +66,7 @@ class MapElites:
     Raises
     ------
     NichechainError
-        If a search by curiosity is given a state and no scores.
+        If the configuration asks for a selection and none is given.
     """
 
     def __init__(
@@ -76,12 +76,15 @@ class MapElites:
         mutate: Mutation,
         config: BuildConfig,
         state: SearchState | None = None,
-        curiosity: CuriosityScores | None = None,
+        selection: ParentSelection | None = None,
         stretch: Stretch | None = None,
     ) -> None:
-        if config.selection == "curiosity" and state is not None and curiosity is None:
-            raise NichechainError("a search that selects by curiosity goes on from its scores: give them")
-        self._curiosity = curiosity or CuriosityScores()
+        if selection is None and config.selection != "uniform":
+            raise NichechainError(
+                f"selection is missing: the configuration asks for {config.selection}, "
+                "which goes on from the births so far"
+            )
+        self._selection = UniformParents() if selection is None else selection
         # Tells its elites from those of any other search in this process.
         self._number = next(_NUMBERS)
         self._domain = domain
@@ -173,12 +176,10 @@ class MapElites:
                 "widen the bounds, keep outside as a state, or raise the number of initial births"
             )
         batch = self._stretch.batch
+        self._selection.begin(step)
+        weights = self._selection.weights(occupied, self._archive.uids(occupied))
         rng = keyed(self._config.seed, Purpose.SELECTION, step)
-        if self._config.selection == "curiosity":
-            scores = self._curiosity.of(self._archive.elites(occupied).uid)
-            drawn = draw_curious(scores, batch, rng)
-        else:
-            drawn = rng.integers(len(occupied), size=batch)
+        drawn = draw_parents(weights, len(occupied), batch, rng)
         distinct, parent = np.unique(drawn, return_inverse=True)
         elites = self._archive.elites(occupied[distinct])
         # Drawn for every child, so that a lineage begins at an elite that its first birth had drawn.
@@ -237,8 +238,8 @@ class MapElites:
             )
         )
         self._lineages = self._gone_on(offspring, niche)
-        if self._config.selection == "curiosity":
-            self._curiosity.tell(offspring.parent_uid, accepted)
+        step = np.full(len(offspring), self.step)
+        self._selection.tell(Told(offspring.parent_uid, offspring.parent_niche, niche, accepted, step))
         return births.make_table(offspring, evaluation, child_niche=niche, accepted=accepted, step=self.step)
 
     def _gone_on(self, offspring: Offspring, niche: NDArray[np.int64]) -> UnderWay:

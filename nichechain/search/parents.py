@@ -1,4 +1,4 @@
-"""Which elites become parents: the curiosity score, and the draw that follows it.
+"""Parents by curiosity: the score of each elite, and the selection that follows it.
 
 The curiosity score is the propensity of an elite to have children that enter the archive: it begins
 at 0, rises by 1 with every child that becomes the elite of its niche, be it of an empty one or in
@@ -20,12 +20,12 @@ from typing import Literal
 
 import numpy as np
 import pandas as pd
-import pyarrow as pa
 from numpy.typing import NDArray
 
 from nichechain.births.table import NONE, check_columns
 from nichechain.core.checks import check_choice
 from nichechain.core.errors import NichechainError
+from nichechain.search.selection import Told
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -39,53 +39,28 @@ the start, is drawn a fifth as often as one of the least score above it.
 """
 
 
-class CuriosityScores:
-    """The scores of all parents so far."""
+class CuriousParents:
+    """Elites in proportion to their score so far, or to ``FLOOR`` where that is larger."""
 
     def __init__(self) -> None:
         self._scores: dict[int, float] = {}
 
-    @classmethod
-    def of_births(cls, births: pa.Table) -> CuriosityScores:
-        """Scores after the births of one run."""
-        scores = cls()
-        parents = births["parent_uid"].fill_null(NONE).to_numpy()
-        scores.tell(parents, births["accepted"].to_numpy(zero_copy_only=False))
-        return scores
-
-    def tell(self, parent_uid: Ints, accepted: NDArray[np.bool_]) -> None:
-        """What became of some children.
-
-        Parameters
-        ----------
-        parent_uid : (N,) int64 array
-            ``NONE`` for an initial birth, which is nobody's child.
-        accepted : (N,) bool array
-        """
-        for uid, entered in zip(parent_uid.tolist(), accepted.tolist(), strict=True):
+    def tell(self, births: Told) -> None:
+        """What became of some births."""
+        for uid, entered in zip(births.parent_uid.tolist(), births.accepted.tolist(), strict=True):
             if uid != NONE:
                 self._scores[uid] = self._scores.get(uid, 0.0) + (ENTERED if entered else REFUSED)
 
-    def of(self, uid: Ints) -> Floats:
+    def begin(self, step: int) -> None:
+        """Nothing is to be prepared."""
+
+    def scores(self, uid: Ints) -> Floats:
         """Score of each of some elites, (K,)."""
         return np.array([self._scores.get(one, 0.0) for one in uid.tolist()])
 
-
-def draw_curious(scores: Floats, size: int, rng: np.random.Generator) -> Ints:
-    """Rows drawn with replacement, in proportion to max(score, ``FLOOR``).
-
-    Parameters
-    ----------
-    scores : (K,) array
-    size : int
-    rng : numpy.random.Generator
-
-    Returns
-    -------
-    (size,) int64 array
-    """
-    weights = np.maximum(scores, FLOOR)
-    return rng.choice(len(scores), size=size, p=weights / weights.sum())
+    def weights(self, niche: Ints, uid: Ints) -> Floats | None:  # noqa: ARG002
+        """Weight of each of some elites, (K,)."""
+        return np.maximum(self.scores(uid), FLOOR)
 
 
 def curiosity(births: pd.DataFrame, by: Literal["elite", "niche"] = "elite") -> pd.DataFrame:

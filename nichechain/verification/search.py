@@ -22,6 +22,7 @@ from nichechain.search.config import BuildConfig
 from nichechain.search.elites import Elites, SearchState
 from nichechain.search.lineages import Stretch, UnderWay
 from nichechain.search.map_elites import MapElites
+from nichechain.steering import make_selection
 from nichechain.variation.brood import Brood
 from nichechain.verification.record import Births, Bools, Run, differs, largest_difference
 from nichechain.verification.result import SEARCH, Check
@@ -71,7 +72,8 @@ def search_again(
     for config, end, stretch in _stretches(run):
         if state is not None:
             state = SearchState.at_rest(state.elites, state.births, state.step)
-        search = MapElites(domain, niches, lambda parent, _: parent, config, state, stretch=stretch)
+        selection = make_selection(config, niches)
+        search = MapElites(domain, niches, lambda parent, _: parent, config, state, selection, stretch)
         while search.births < end:
             rows.append(search.advance(record, end - search.births, on_done))
         state = search.state

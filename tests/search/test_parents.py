@@ -16,7 +16,8 @@ from nichechain import BuildConfig, NichechainError, Threads, build, load, varia
 from nichechain.domains import PlanarArm
 from nichechain.niches import GridNiches
 from nichechain.search.map_elites import MapElites
-from nichechain.search.parents import FLOOR, CuriosityScores, curiosity, draw_curious
+from nichechain.search.parents import FLOOR, CuriousParents, curiosity
+from nichechain.search.selection import Told, draw_parents
 
 CONFIG = BuildConfig(
     "arm",
@@ -92,8 +93,8 @@ def test_curious_parents_have_children_that_enter_more_often(archive, tmp_path):
 
 def test_a_search_cannot_go_on_without_its_scores():
     niches = GridNiches(CONFIG.shape, CONFIG.bounds)
-    search = MapElites(PlanarArm(), niches, variation.cauchy(), CONFIG)
-    with pytest.raises(NichechainError, match="goes on from its scores"):
+    search = MapElites(PlanarArm(), niches, variation.cauchy(), CONFIG, selection=CuriousParents())
+    with pytest.raises(NichechainError, match="selection is missing: the configuration asks for curiosity"):
         MapElites(PlanarArm(), niches, variation.cauchy(), CONFIG, search.state)
 
 
@@ -107,11 +108,12 @@ def test_scores_are_a_fold_over_births_in_any_order(births, random):
     random.shuffle(shuffled)
     found = []
     for rows in (births, shuffled):
-        scores = CuriosityScores()
+        parents = CuriousParents()
         cut = len(rows) // 3
         for part in (rows[:cut], rows[cut:]):
-            scores.tell(np.array([p for p, _ in part], np.int64), np.array([a for _, a in part], bool))
-        found.append(scores.of(np.arange(5)))
+            uid, none = np.array([p for p, _ in part], np.int64), np.zeros(len(part), np.int64)
+            parents.tell(Told(uid, none, none, np.array([a for _, a in part], bool), none))
+        found.append(parents.scores(np.arange(5)))
     np.testing.assert_array_equal(*found)
     for uid in range(5):
         children = [entered for parent, entered in births if parent == uid]
@@ -119,10 +121,16 @@ def test_scores_are_a_fold_over_births_in_any_order(births, random):
 
 
 def test_elites_are_drawn_in_proportion_to_their_score_or_the_floor():
-    scores = np.array([-3.0, 0.0, 0.5, 2.0])
-    drawn = np.bincount(draw_curious(scores, 100_000, np.random.default_rng(0)), minlength=4)
-    weights = np.array([FLOOR, FLOOR, 0.5, 2.0])
-    assert stats.chisquare(drawn, 100_000 * weights / weights.sum()).pvalue > 1e-3
+    parents = CuriousParents()
+    uid = np.array([0] * 6 + [2, 2] + [3] * 2)
+    accepted = np.array([False] * 6 + [True, False] + [True] * 2)
+    none = np.zeros(uid.size, np.int64)
+    parents.tell(Told(uid, none, none, accepted, none))
+    expected = np.array([FLOOR, FLOOR, 0.5, 2.0])
+    weights = parents.weights(np.zeros(4, np.int64), np.arange(4))
+    np.testing.assert_array_equal(weights, expected)
+    drawn = np.bincount(draw_parents(weights, 4, 100_000, np.random.default_rng(0)), minlength=4)
+    assert stats.chisquare(drawn, 100_000 * expected / expected.sum()).pvalue > 1e-3
 
 
 def test_scores_of_all_elites_come_from_a_table_of_births(archive):
@@ -153,8 +161,3 @@ def test_births_that_do_not_tell_are_refused(archive):
         curiosity(unknown, by="niche")
     with pytest.raises(NichechainError, match="by is 'cell', but must be one of elite, niche"):
         curiosity(births, by="cell")
-
-
-def test_selection_is_one_of_two():
-    with pytest.raises(NichechainError, match="selection is 'rank', but must be one of uniform, curiosity"):
-        replace(CONFIG, selection="rank")

@@ -1,0 +1,47 @@
+"""The chain steers the search: selections of parents that ask what their descendants would do.
+
+The chain of the births so far is kept as they come, see :mod:`nichechain.steering.online`, and elites
+become parents by what it foretells of them. All that a selection knows follows from births, so an archive
+holds nothing more for it, a build that is resumed draws the parents of one that never stopped, and
+``verify`` draws them again.
+
+A selection that asks the chain begins uniformly: the first step has no births with a parent to learn from.
+"""
+
+from __future__ import annotations
+
+from nichechain.niches import Niches
+from nichechain.search.config import BuildConfig, SelectionName, parse_selection
+from nichechain.search.parents import CuriousParents
+from nichechain.search.selection import Mixture, ParentSelection, Tempered, UniformParents
+from nichechain.steering.reach import ReachParents
+
+__all__ = ["make_selection"]
+
+_SHARPENED = 0.3
+"""Temperature of selections that ask the chain: of 1, 0.5, 0.3 and 0.2 the one that needed the fewest births
+on arms and maps of other seeds than those of the study."""
+
+
+def make_selection(config: BuildConfig, niches: Niches) -> ParentSelection:
+    """The selection of parents that a configuration asks for, before any birth.
+
+    Parameters
+    ----------
+    config : BuildConfig
+    niches : Niches
+    """
+    parts = parse_selection(config.selection)
+    selections = [_make(name, config, niches) for name, _ in parts]
+    return selections[0] if len(parts) == 1 else Mixture(selections, [share for _, share in parts])
+
+
+def _make(name: SelectionName, config: BuildConfig, niches: Niches) -> ParentSelection:
+    match name:
+        case "uniform":
+            return UniformParents()
+        case "curiosity":
+            return Tempered(CuriousParents(), config.temperature or 1.0)
+        case "reach":
+            reach = ReachParents(niches, config.batch, config.selection_l, config.selection_lineages)
+            return Tempered(reach, config.temperature or _SHARPENED)
