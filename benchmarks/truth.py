@@ -27,7 +27,7 @@ from truth_data import BIRTHS, DATASETS, load, make
 from truth_models import ESTIMATORS, Estimator
 from truth_scores import score, thinned
 
-from nichechain import Threads
+from nichechain import execution
 
 _LEVELS = (1, 2, 3, 4, 5, 10)
 _FEWEST = 2_000
@@ -61,7 +61,7 @@ def main() -> None:
     )
     parser.add_argument("--only", nargs="+", choices=tuple(DATASETS), help="these data sets")
     parser.add_argument("--held-out", action="store_true", help="those held out as well")
-    parser.add_argument("--workers", type=int, default=None, help="threads; by default all processors")
+    parser.add_argument("--workers", default=None, help="as nichechain has it, such as 4 or processes:4")
     parser.add_argument("--estimators", nargs="+", default=["empirical-bayes", "mle"])
     parser.add_argument("--prototype", nargs="+", default=[], metavar="MODULE:FUNCTION")
     parser.add_argument("--births", nargs="+", type=int, default=[40_000, 8_000, _FEWEST])
@@ -71,7 +71,7 @@ def main() -> None:
     given = parser.parse_args()
     names = given.only or [name for name, data in DATASETS.items() if data.development or given.held_out]
     if given.verb == "make":
-        with Threads(given.workers) as executor:
+        with execution.make(given.workers) as executor:
             for name in names:
                 make(name, given.folder, executor, _tell)
     elif given.verb == "score":

@@ -29,6 +29,7 @@ import nichechain
 from nichechain.archive import read
 from nichechain.births import NONE
 from nichechain.core.randomness import Purpose, keyed
+from nichechain.execution import Executor
 from nichechain.validation import Lineages, run_lineages
 from nichechain.verification.replay import replayed
 
@@ -37,7 +38,7 @@ LINEAGE_BIRTHS, SHORTEST = 4_000, 5
 FIRST_UID = 1_000_000
 """Births of lineages are numbered from here on, beyond those of any build of the table."""
 _SEEDS = {"A": 10_001, "B": 10_002, "strata": 30_001, "course": 20_002}
-_BLOCK = {100: 20, 20: 1}
+_BLOCK = {100: 20, 20: 10}
 
 _SQUARE = ((-1.0, 1.0), (-1.0, 1.0))
 _TABLE_TOP = ((1.05, 1.55), (0.40, 1.10))
@@ -75,7 +76,12 @@ class DataSet:
     def config(self) -> nichechain.BuildConfig:
         """How its archive is built."""
         return nichechain.BuildConfig(
-            domain=self.domain, shape=self.shape, bounds=self.bounds, evaluations=BIRTHS, **self.options
+            domain=self.domain,
+            shape=self.shape,
+            bounds=self.bounds,
+            evaluations=BIRTHS,
+            lineage_share=0.0,
+            **self.options,
         )
 
 
@@ -102,7 +108,7 @@ DATASETS: dict[str, DataSet] = {
     "arm-0.02": _arm((20, 20), True, scale=0.02),
     "cosinus": _map("cosinus", 120, True, mutation="gaussian", scale=0.2),
     "umaze": _maze("PointMaze_UMaze-v3", 1.5, 100, True, scale=0.1),
-    "fetch-1": _fetch(True, scale=1.0, splits="AB", shipped="fetch-pick-and-place"),
+    "fetch-1": _fetch(True, scale=1.0, splits="A", shipped="fetch-pick-and-place"),
     "fetch-0.1": _fetch(True, scale=0.1),
     "arm-0.1-30x30": _arm((30, 30), False, scale=0.1, seed=1),
     "arm-0.05-20joints": _arm((20, 20), False, scale=0.05, seed=2, domain_options={"joints": 20}),
@@ -149,7 +155,7 @@ class Truth:
         return pa.concat_tables([table, known.slice(0, bought).select(table.column_names)])
 
 
-def make(name: str, folder: Path, executor: nichechain.Threads, tell: Callable[[str], None]) -> None:
+def make(name: str, folder: Path, executor: Executor, tell: Callable[[str], None]) -> None:
     """Make what is not there of a data set."""
     data, home = DATASETS[name], folder / name
     home.mkdir(parents=True, exist_ok=True)
@@ -196,7 +202,7 @@ def _make_truth(
     path: Path,
     split: int,
     lineages: int,
-    executor: nichechain.Threads,
+    executor: Executor,
     tell: Callable[[str], None],
 ) -> None:
     if path.exists():
@@ -239,7 +245,7 @@ def _make_truth(
 
 
 def _make_births(
-    archive: nichechain.Archive, path: Path, executor: nichechain.Threads, tell: Callable[[str], None]
+    archive: nichechain.Archive, path: Path, executor: Executor, tell: Callable[[str], None]
 ) -> None:
     if path.exists():
         return
@@ -333,10 +339,10 @@ def _extra(path: Path, births: pa.Table) -> pa.Table:
     for column in births.schema:
         if column.name == "child_niche":
             columns[column.name] = pa.array(np.array(kept[column.name]), mask=failed).cast(column.type)
-        elif column.name in kept.column_names:
-            columns[column.name] = kept[column.name].combine_chunks().cast(column.type)
         elif column.name == "lineage":
             columns[column.name] = pa.array(np.array(kept["generation"]) > 1)
+        elif column.name in kept.column_names:
+            columns[column.name] = kept[column.name].combine_chunks().cast(column.type)
         elif column.name == "failed":
             columns[column.name] = pa.array(np.where(failed, "failed", ""), mask=~failed)
         else:
