@@ -6,8 +6,9 @@ A data set is a folder with
 - ``truth-A.npz``: U lineages without selection of 10 generations from each of 100 elites, one out
   of each of 100 equal groups of filled niches, ordered by the births of their row of T. Split B
   holds other elites of the same groups;
-- ``lineage-births-course.parquet``: 4,000 births of lineages without selection that a search could
-  have spent itself. They begin at elites as they were at instants drawn uniformly over the search.
+- ``broods.parquet``: 4,000 births of lineages without selection that a search could have spent
+  itself, ten of each elite and ten generations long. They begin at elites as they were at
+  instants drawn uniformly over the search.
 
 Everything is a function of the table below, and is made once; what is there is kept.
 """
@@ -34,10 +35,10 @@ from nichechain.validation import Lineages, run_lineages
 from nichechain.verification.replay import replayed
 
 BIRTHS, ELITES, GENERATIONS, OFFSPRING = 40_000, 100, 10, 30
-LINEAGE_BIRTHS, SHORTEST = 4_000, 5
+BROODS, BROOD = 40, 10
 FIRST_UID = 1_000_000
 """Births of lineages are numbered from here on, beyond those of any build of the table."""
-_SEEDS = {"A": 10_001, "B": 10_002, "strata": 30_001, "course": 20_002}
+_SEEDS = {"A": 10_001, "B": 10_002, "strata": 30_001, "broods": 20_003}
 _BLOCK = {100: 20, 20: 10}
 
 _SQUARE = ((-1.0, 1.0), (-1.0, 1.0))
@@ -168,7 +169,7 @@ def make(name: str, folder: Path, executor: Executor, tell: Callable[[str], None
     archive = nichechain.load(path)
     for number, split in enumerate(data.splits):
         _make_truth(archive, home / f"truth-{split}.npz", number, data.lineages, executor, tell)
-    _make_births(archive, home / "lineage-births-course.parquet", executor, tell)
+    _make_births(archive, home / "broods.parquet", executor, tell)
 
 
 def load(name: str, folder: Path, split: str = "A") -> Truth | None:
@@ -180,7 +181,7 @@ def load(name: str, folder: Path, split: str = "A") -> Truth | None:
     births = read.read_births(archive.folder, archive.meta)
     if "lineage" not in births.column_names:
         births = births.append_column("lineage", pa.array(np.zeros(len(births), bool)))
-    path = home / "lineage-births-course.parquet"
+    path = home / "broods.parquet"
     with np.load(home / f"truth-{split}.npz") as kept:
         lineages = Lineages(*(kept[k].astype(np.int64) for k in ("root_niche", "niches", "offspring")))
         uid = kept["root_uid"].astype(np.int64)
@@ -250,17 +251,13 @@ def _make_births(
     if path.exists():
         return
     tell(f"{path.parent.name}: births of lineages")
-    seed = _SEEDS["course"]
-    rng = keyed(seed, Purpose.CHECKED)
-    lengths: list[int] = []
-    while sum(lengths) < LINEAGE_BIRTHS:
-        lengths.append(int(rng.integers(SHORTEST, GENERATIONS + 1)))
-    lengths[-1] -= sum(lengths) - LINEAGE_BIRTHS
-    uid, niche, depth, genotypes, when = _starts(archive, len(lengths), rng)
+    seed = _SEEDS["broods"]
+    starts = _starts(archive, BROODS, keyed(seed, Purpose.CHECKED))
+    uid, niche, depth, when = (np.repeat(some, BROOD) for some in (*starts[:3], starts[4]))
+    genotypes = starts[3]
     alive = [(i, genotypes[int(u)], int(u), int(n)) for i, (u, n) in enumerate(zip(uid, niche, strict=True))]
     rows: list[dict[str, Any]] = []
     for generation in range(GENERATIONS):
-        alive = [one for one in alive if generation < lengths[one[0]]]
         if not alive:
             break
         children = [

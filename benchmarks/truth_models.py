@@ -17,6 +17,9 @@ from scipy import sparse
 from nichechain import NicheChain, Niches, TransitionCounts, estimate
 from nichechain.births import NONE
 from nichechain.core.row_sampler import RowSampler
+from nichechain.evolvability.averaging import spread_of
+from nichechain.evolvability.question import Question, dense
+from nichechain.evolvability.record import draw_children
 from nichechain.validation.rollouts import niches_reached
 
 DRAWS, CHECKS = 50, 200
@@ -80,7 +83,7 @@ class Forecast:
     draws : (D, R, l) float64 array
         Expected number of niches up to each generation, in each draw of all that births leave
         unknown; a single one where the model has no such thing.
-    simulated : (R, l, K) int64 array
+    simulated : (R, l, K) float64 array
         Numbers of K simulated checks on those draws: what is unknown and the chance of so few
         lineages are both in their spread.
     """
@@ -115,18 +118,17 @@ class PlainChain:
     """A chain over niches, with a posterior for T or without."""
 
     def __init__(self, births: pa.Table, niches: Niches, estimator: str) -> None:
-        parent, child, elite = (
-            births[name].fill_null(NONE).to_numpy().astype(np.int64)
-            for name in ("parent_niche", "child_niche", "parent_uid")
+        elite, child = (
+            births[name].fill_null(NONE).to_numpy().astype(np.int64) for name in ("parent_uid", "child_niche")
         )
-        counts = TransitionCounts.from_births(parent, child, niches, elite=elite)
+        counts = TransitionCounts.from_births(births, niches)
         self.chain: NicheChain = estimate(counts, estimator)  # type: ignore[arg-type]
         self._families = elite, child
 
     def log_probability(self, steps: Steps) -> np.ndarray:
         """Of the mean of T."""
         with np.errstate(divide="ignore"):
-            return np.log(_dense(self.chain.T)[steps.history[:, 0], steps.child])
+            return np.log(dense(self.chain.T)[steps.history[:, 0], steps.child])
 
     def forecast(self, roots: Roots, generations: int, lineages: int, seed: int) -> dict[str, Forecast]:
         """From all three starts; the last two give the elite its own children beside the row of T."""
@@ -136,23 +138,22 @@ class PlainChain:
             "elite": self._recorded(roots.uid),
             "genotype": self._recorded(roots.uid) + _landed(roots.offspring, states),
         }
+        question = Question(draws=DRAWS, seed=seed)
         draws = 1 if chain.posterior is None else DRAWS
         values, simulated = [], []
-        for number in range(draws):
+        for number, drawn in enumerate(question.samples(chain)):
             rng = np.random.default_rng([seed, number])
-            matrix = _dense(chain.T if chain.posterior is None else chain.posterior.draw(rng))
-            rows = matrix[roots.niche]
+            rows = dense(drawn.children(roots.niche))
             strength = 1.0 if chain.posterior is None else chain.posterior.elite_concentration
-            firsts = [rows]
-            for start in ("elite", "genotype"):
-                weight = rng.standard_gamma(known[start] + strength * rows)
-                firsts.append(weight / weight.sum(axis=1, keepdims=True))
-            first = np.concatenate(firsts)
-            values.append(coverage(matrix, first, generations, lineages, chain.n_niches))
+            firsts = [rows, *(draw_children(known[s], rows, rng, strength) for s in ("elite", "genotype"))]
+            first, onward = np.concatenate(firsts), dense(drawn.onward)
+            values.append(coverage(onward, first, generations, lineages, chain.n_niches))
             simulated.append(
-                simulated_coverage(matrix, first, generations, lineages, chain.n_niches, CHECKS // draws, rng)
+                simulated_coverage(onward, first, generations, lineages, chain.n_niches, CHECKS // draws, rng)
             )
-        expected, checks = np.stack(values), np.concatenate(simulated, axis=2)
+        expected, checks = np.stack(values), np.concatenate(simulated, axis=2).astype(np.float64)
+        middle = checks.mean(axis=2, keepdims=True)
+        checks = np.clip(middle + spread_of(chain) * (checks - middle), 0.0, chain.n_niches)
         size = roots.niche.size
         return {
             start: Forecast(expected[:, k * size :][:, :size], checks[k * size :][:size])
@@ -213,10 +214,6 @@ def simulated_coverage(
 
 def _landed(offspring: np.ndarray, states: int) -> np.ndarray:
     return np.stack([np.bincount(row[row != NONE], minlength=states) for row in offspring])
-
-
-def _dense(matrix: object) -> np.ndarray:
-    return matrix if isinstance(matrix, np.ndarray) else matrix.toarray()  # type: ignore[attr-defined]
 
 
 def _plain(name: str) -> Estimator:

@@ -12,7 +12,8 @@ from scipy import sparse
 
 from nichechain.births.families import tabulated
 from nichechain.births.joins import across_runs
-from nichechain.births.table import NONE
+from nichechain.births.lineages import lineages_of, no_lineages
+from nichechain.births.table import LINEAGE, NONE
 from nichechain.core.checks import as_floats, as_whole
 from nichechain.core.errors import NichechainError
 from nichechain.niches import Niches
@@ -32,8 +33,8 @@ _MOST_BIRTHS = 2.0**53
 class TransitionCounts:
     """Births from niche to niche; counts of several runs add.
 
-    Every evaluated child counts, accepted or not. States keep the numbers of
-    the grid: none is dropped or renumbered.
+    Every evaluated child of a selected parent counts, accepted or not; births of unselected lineages
+    are kept apart. States keep the numbers of the grid: none is dropped or renumbered.
 
     Parameters
     ----------
@@ -45,12 +46,16 @@ class TransitionCounts:
     families : (F, 4) int64 array
         Rows (state, elite, child state, children): whose children they are, as far as births say.
         Numbers of elites matter only in that they differ.
+    lineages : (L, 5) int64 array
+        Births of unselected lineages, see :mod:`nichechain.births.lineages`. Those after the first of
+        each are not in ``matrix``, since a search hardly ever makes such a birth a parent.
     """
 
     matrix: sparse.csr_array
     niches: Niches
     visits: Ints
     families: Ints = field(default_factory=lambda: np.empty((0, 4), np.int64))
+    lineages: Ints = field(default_factory=no_lineages)
 
     @overload
     @classmethod
@@ -118,12 +123,20 @@ class TransitionCounts:
         for name in ("parent_niche", "child_niche"):
             if name not in names:
                 raise NichechainError(f"births have no column {name}, but need parent_niche and child_niche")
-        elite = None
+        parent, child = (_states(name, births[name]) for name in ("parent_niche", "child_niche"))
+        elite = run = None
         if "parent_uid" in names:
             elite = _states("parent_uid", births["parent_uid"])
-            if "run" in names:
-                (elite,) = across_runs(_states("run", births["run"]), elite)
-        return cls.from_births(births["parent_niche"], births["child_niche"], niches, elite=elite)
+            run = _states("run", births["run"]) if "run" in names else np.zeros(elite.size, np.int64)
+            (numbered,) = across_runs(run, elite)
+        flagged = _flags(births[LINEAGE]) if LINEAGE in names else np.zeros(parent.size, bool)
+        selected = np.where(flagged, NONE, parent)
+        counts = cls.from_births(selected, child, niches, elite=None if elite is None else numbered)
+        if elite is None or run is None or "uid" not in names or not flagged.any():
+            return counts
+        _check_pairs(parent, child, niches, lowest=NONE)
+        uid = _states("uid", births["uid"])
+        return replace(counts, lineages=lineages_of(run, uid, elite, parent, child, flagged))
 
     @classmethod
     def from_trajectories(cls, trajectories: Iterable[ArrayLike], niches: Niches) -> TransitionCounts:
@@ -232,11 +245,14 @@ class TransitionCounts:
         if len(self.families):
             # Elites of two runs may bear the same number.
             later[:, 1] += self.families[:, 1].max() + 1 - later[:, 1].min(initial=0)
+        lineages = other.lineages.copy()
+        lineages[:, :2] += self.lineages[:, :2].max(axis=0, initial=-1) + 1
         return TransitionCounts(
             (self.matrix + other.matrix).tocsr(),
             self.niches,
             self.visits + other.visits,
             np.concatenate([self.families, later]),
+            np.concatenate([self.lineages, lineages]),
         )
 
     @property
@@ -295,6 +311,13 @@ def _states(name: str, values: Any) -> Ints:
     elif np.ma.isMaskedArray(values):
         values = values.filled(NONE)
     return as_whole(name, values)
+
+
+def _flags(values: Any) -> NDArray[np.bool_]:
+    """Yes or no, no for what pandas and Arrow call null."""
+    if hasattr(values, "fill_null"):
+        return values.fill_null(False).to_numpy(zero_copy_only=False).astype(bool)  # type: ignore[no-any-return]
+    return np.asarray(values.fillna(False) if hasattr(values, "fillna") else values, bool)
 
 
 def _check_pairs(parent: Ints, child: Ints, niches: Niches, *, lowest: int) -> None:

@@ -11,6 +11,7 @@ from scipy import sparse
 
 from nichechain.chain.base_measure import BaseMeasure
 from nichechain.chain.counts import TransitionCounts
+from nichechain.chain.lineages import fitted_law
 from nichechain.chain.model import NicheChain, Transition
 from nichechain.chain.operator import PooledTransition
 from nichechain.chain.posterior import DirichletPosterior
@@ -43,7 +44,8 @@ def estimate(
     counts : TransitionCounts
     estimator : {"empirical-bayes", "dirichlet", "mle"}
         ``empirical-bayes``: a Dirichlet posterior for every row around a base measure pooled over
-        all rows, with children of one elite counted as related. ``dirichlet``: the same around
+        all rows, with children of one elite counted as related, and lineages as births of lineages
+        show them where there are any (:mod:`nichechain.chain.lineages`). ``dirichlet``: the same around
         the uniform distribution, every birth counting in full. ``mle``: row-normalised counts,
         the paper's literal T.
     unvisited : {"self", "uniform", "base", "absorb"}, optional
@@ -148,10 +150,14 @@ def _empirical_bayes(counts: TransitionCounts, strength: float | None) -> NicheC
     prior = fit_prior(counts, None if strength is None else _positive(strength))
     effect = prior.design_effect
     posterior = DirichletPosterior(counts, prior.base, prior.strength, effect, prior)
+    posterior = replace(posterior, law=fitted_law(posterior))
     births = counts.births
     typical = (births * effect).sum() / max(1, births.sum())
     related = f", {typical:.2g} births count as one" if typical >= 1.05 else ""
-    return with_posterior(counts, posterior, f"empirical-bayes, strength {prior.strength:.3g}{related}")
+    law = posterior.law
+    checked = "" if law is None else f", calibrated on lineages of {law.broods} elites"
+    name = f"empirical-bayes, strength {prior.strength:.3g}{related}{checked}"
+    return with_posterior(counts, posterior, name)
 
 
 def refitted(posterior: DirichletPosterior, counts: TransitionCounts) -> DirichletPosterior:

@@ -37,7 +37,8 @@ def counts_of(
         Only births that became the elite of their niche. Their T is that of the children that a
         search kept, not of all that parents have.
     lineages : bool, optional
-        Only births whose parent is the latest of an unselected lineage, or only all others.
+        Only births whose parent is the latest of an unselected lineage, counted as others are, or
+        only all others.
 
     Returns
     -------
@@ -65,7 +66,8 @@ def counts_of(
     if lineages is not None:
         check_columns(births, LINEAGE)
         flag = births[LINEAGE].fill_null(False)
-        births = births.filter(flag if lineages else pc.invert(flag))
+        # What is asked for by name is counted like any other births.
+        births = births.filter(flag if lineages else pc.invert(flag)).drop_columns([LINEAGE])
     return TransitionCounts.from_births(births, niches)
 
 

@@ -13,6 +13,7 @@ from scipy import sparse
 from nichechain.chain.base_measure import BaseMeasure
 from nichechain.chain.counts import TransitionCounts
 from nichechain.chain.elites import elite_concentration
+from nichechain.chain.lineages import LineageLaw
 from nichechain.chain.operator import PooledTransition
 from nichechain.chain.prior import FittedPrior
 
@@ -47,6 +48,8 @@ class DirichletPosterior:
         e, the number of births of each row that are worth one independent birth.
     prior : FittedPrior, optional
         Where B and s come from: then every draw has a base measure and a strength of its own.
+    law : LineageLaw, optional
+        How rows for lineages follow from T, where births of lineages tell.
     """
 
     counts: TransitionCounts
@@ -54,6 +57,7 @@ class DirichletPosterior:
     strength: float
     design_effect: Floats
     prior: FittedPrior | None = None
+    law: LineageLaw | None = None
 
     @cached_property
     def weights(self) -> sparse.csr_array:

@@ -55,6 +55,8 @@ class Purpose(IntEnum):
     """Runs or elites drawn with replacement; index: the resample."""
     VERIFICATION = 23
     """Which elites (index 0) and which births (index 1) of an archive are evaluated again."""
+    LINEAGE_LAW = 40
+    """Lineages simulated to see how far those of one elite overlap."""
     TESSELLATION = 30
     """Uniform samples that a Voronoi tessellation is made of."""
 

@@ -24,14 +24,17 @@ ENDLESS = 10**9
 SATURATED = 0.95
 
 
-def one_root(chain: NicheChain, samples: Iterator[Sample], question: Question, repeats: int) -> Evolvability:
-    """Evolvability of one root over samples of T and of the first state that counts, (S,)."""
-    n = chain.n_niches
+def one_root(
+    chain: NicheChain, samples: Iterator[Sample], question: Question, repeats: int, own: int | None = None
+) -> Evolvability:
+    """Evolvability of one root over samples of T and of generation 1, (S,), and of where it stands itself."""
+    n, steps = chain.n_niches, question.drawn_steps(own)
+    stands = None if own is None else np.array([own])
     means, errors, saturated = [], [], False
     for number, (matrix, first) in enumerate(samples):
         if question.method != "monte-carlo":
             covered, endless = expected_coverage(
-                matrix, first[None, :], question.steps, [question.lineages, ENDLESS], counted=n
+                matrix, first[None, :], steps, [question.lineages, ENDLESS], counted=n, own=stands
             )[0]
             saturated |= bool(covered > SATURATED * endless)
             means.append(covered)
@@ -39,11 +42,12 @@ def one_root(chain: NicheChain, samples: Iterator[Sample], question: Question, r
         else:
             rng = keyed(question.seed, Purpose.WALKS, number)
             sampled = sampled_coverage(
-                matrix, first, question.steps, question.lineages, repeats, rng, counted=n
+                matrix, first, steps, question.lineages, repeats, rng, counted=n, own=own
             )
             means.append(sampled.mean())
             errors.append(standard_error(sampled))
-    value, error, low, high = (float(x) for x in summary(np.array(means), np.array(errors)))
+    figures = summary(np.array(means), np.array(errors), spread_of(chain), n)
+    value, error, low, high = (float(x) for x in figures)
     return Evolvability(
         value,
         error,
@@ -65,10 +69,25 @@ def standard_error(sampled: NDArray[np.int64]) -> float:
     return float(sampled.std(ddof=1) / math.sqrt(size)) if size > 1 else math.nan
 
 
-def summary(means: Floats, errors: Floats) -> tuple[Floats, Floats, Floats, Floats]:
-    """Mean over the draws along axis 0, its standard error, and the interval."""
+def spread_of(chain: NicheChain) -> float:
+    """How many times wider elites differ than draws do, see :class:`nichechain.chain.lineages.LineageLaw`."""
+    law = None if chain.posterior is None else chain.posterior.law
+    return 1.0 if law is None else law.spread
+
+
+def widened(mean: Floats, low: Floats, high: Floats, spread: float, most: int) -> tuple[Floats, Floats]:
+    """An interval around a mean made so many times wider, within 0 and ``most`` niches."""
+    if spread == 1.0:
+        return low, high
+    return np.maximum(mean - spread * (mean - low), 0.0), np.minimum(mean + spread * (high - mean), most)
+
+
+def summary(
+    means: Floats, errors: Floats, spread: float = 1.0, most: int = 0
+) -> tuple[Floats, Floats, Floats, Floats]:
+    """Mean over the draws along axis 0, its standard error, and the interval, see :func:`widened`."""
     size = len(means)
-    low, high = drawn_interval(means)
+    low, high = widened(means.mean(axis=0), *drawn_interval(means), spread, most)
     if size == 1:
         return means[0], errors[0], low, high
     # The spread of the draws' means already has the simulations' error in it.

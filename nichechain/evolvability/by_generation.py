@@ -13,12 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse, stats
 
-from nichechain.chain.model import NicheChain, Transition
+from nichechain.chain.lineages import urns_of
+from nichechain.chain.model import NicheChain
 from nichechain.core.checks import check_at_least
 from nichechain.core.intervals import drawn_interval
 from nichechain.core.randomness import Purpose, keyed
-from nichechain.evolvability.question import MOST_EXACT, Question
-from nichechain.evolvability.urns import Urns, hit_probabilities
+from nichechain.evolvability.averaging import spread_of, widened
+from nichechain.evolvability.question import MOST_EXACT, DrawnChain, Question, dense
+from nichechain.evolvability.urns import hit_probabilities
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -62,12 +64,16 @@ def evolvability_table(
     question = Question(longest, max(sizes), draws=draws, seed=seed)
     if chain.posterior is not None and chain.states > MOST_EXACT:
         return _simulated(chain, longest, sizes, question)
-    drawn = [_exact(matrix, longest, sizes, chain.n_niches) for matrix in question.transitions(chain)]
-    return np.stack([np.mean(drawn, axis=0), *drawn_interval(drawn)])
+    drawn = [_exact(some, longest, sizes, chain.n_niches) for some in question.samples(chain)]
+    mean = np.mean(drawn, axis=0)
+    return np.stack([mean, *widened(mean, *drawn_interval(drawn), spread_of(chain), chain.n_niches)])
 
 
-def _exact(transition: Transition, longest: int, sizes: list[int], niches: int) -> Floats:
+def _exact(drawn: DrawnChain, longest: int, sizes: list[int], niches: int) -> Floats:
     """Niches that lineages visit on one T, (k, longest, n)."""
+    transition, first = drawn.onward, None
+    if drawn.concentration is not None:
+        first = dense(drawn.children(np.arange(niches)))
     if isinstance(transition, sparse.csr_array) and transition.nnz > _DENSE * transition.shape[0] ** 2:
         transition = transition.toarray()
     plan = _products(sizes)
@@ -77,8 +83,9 @@ def _exact(transition: Transition, longest: int, sizes: list[int], niches: int) 
         hit = np.zeros((transition.shape[0], targets.size))
         hit[targets, targets - start] = 1.0
         for step in range(longest):
+            begun = None if first is None else first @ hit
             hit = np.ascontiguousarray(transition @ hit)
-            _add_reached(hit[:niches], *plan, found[:, step])
+            _add_reached(hit[:niches] if begun is None else begun, *plan, found[:, step])
             # A lineage that stands on its target has visited it, wherever it goes next.
             hit[targets, targets - start] = 1.0
     return found
@@ -139,15 +146,16 @@ def _simulated(chain: NicheChain, longest: int, sizes: list[int], question: Ques
     at_once = max(1, _DESCENDANTS // (lineages * (longest + 1)))
     for draw in range(question.draws):
         rng = keyed(question.seed, Purpose.WALKS, draw)
-        urns = Urns(chain.posterior.settled(keyed(question.seed, Purpose.POSTERIOR, draw)))
+        urns = urns_of(chain.posterior, keyed(question.seed, Purpose.POSTERIOR, draw))
         for start in range(0, n, at_once):
             roots = np.arange(start, min(start + at_once, n))
             first = np.repeat(roots, lineages).reshape(-1, lineages)
-            states = urns.walks(first, longest, rng)[:, lineages:]
+            states = urns.walks(first, longest, rng, roots=True)[:, lineages:]
             whole, halves = _count(states, lineages, n, longest, *tables)
             drawn[draw, :, :, roots] = whole
             noise[:, :, roots] += np.moveaxis(halves, 0, 2) / question.draws
-    return _by_spread(drawn, noise)
+    mean, low, high = _by_spread(drawn, noise)
+    return np.stack([mean, *widened(mean, low, high, spread_of(chain), n)])
 
 
 def _by_spread(drawn: Floats, noise: Floats) -> Floats:

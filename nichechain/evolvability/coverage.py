@@ -46,6 +46,7 @@ def expected_coverage(
     lineages: ArrayLike,
     *,
     counted: int | None = None,
+    own: Ints | None = None,
     columns: int = _COLUMNS,
 ) -> Floats:
     """Expected number of distinct niches that independent lineages visit: l-evolvability.
@@ -62,6 +63,8 @@ def expected_coverage(
         Number U of independent lineages per root, at least 1; several are answered together.
     counted : int, optional
         Only the first so many states are niches that count; by default all are.
+    own : (m,) int64 array, optional
+        Where each root stands, if that is visited as well.
     columns : int
         Target niches treated together. Peak memory is about ``16 * (S + m) * columns`` bytes.
 
@@ -83,7 +86,10 @@ def expected_coverage(
     sizes = _sizes(lineages)
     check_at_least(1, steps=steps)
     coverage = np.zeros((first.shape[0], sizes.size))
-    for _, visited in visit_probabilities(transition, first, steps, counted, columns):
+    for targets, visited in visit_probabilities(transition, first, steps, counted, columns):
+        if own is not None:
+            here = np.flatnonzero((own >= targets[0]) & (own <= targets[-1]))
+            visited[here, own[here] - targets[0]] = 1.0
         for k, some in enumerate(at_least_once(visited, sizes)):
             coverage[:, k] += some.sum(axis=1)
     return coverage if np.ndim(lineages) else coverage[:, 0]
@@ -125,7 +131,13 @@ def visit_probabilities(
 
 
 def coverage_by_generation(
-    transition: LinearOperator, roots: ArrayLike, longest: int, lineages: ArrayLike, counted: int
+    transition: LinearOperator,
+    roots: ArrayLike,
+    longest: int,
+    lineages: ArrayLike,
+    counted: int,
+    *,
+    first: Floats | None = None,
 ) -> Floats:
     """Expected niches that lineages of roots visit, for every length up to the longest.
 
@@ -140,6 +152,8 @@ def coverage_by_generation(
         Numbers U of lineages, each at least 1.
     counted : int
         Only the first so many states are niches that count.
+    first : (m, S) array, optional
+        What generation 1 is drawn from, where that is not the rows of T.
 
     Returns
     -------
@@ -166,8 +180,9 @@ def coverage_by_generation(
         hit = np.zeros((transition.shape[0], targets.size))
         hit[targets, targets - start] = 1.0
         for step in range(longest):
+            begun = None if first is None else first @ hit
             hit = _columns(transition, hit, targets) if step == 0 else transition @ hit
-            for k, some in enumerate(at_least_once(hit[states], sizes)):
+            for k, some in enumerate(at_least_once(hit[states] if begun is None else begun, sizes)):
                 found[:, step, k] += some.sum(axis=1)
             # A lineage that stands on its target has visited it, wherever it goes next.
             hit[targets, targets - start] = 1.0
@@ -192,6 +207,7 @@ def sampled_coverage(
     rng: np.random.Generator,
     *,
     counted: int | None = None,
+    own: int | None = None,
 ) -> Ints:
     """Numbers of niches visited in simulations: the paper's procedure, steps 5 to 7.
 
@@ -207,6 +223,8 @@ def sampled_coverage(
     rng : numpy.random.Generator
     counted : int, optional
         Only the first so many states are niches that count; by default all are.
+    own : int, optional
+        Where the root stands, if that is visited as well.
 
     Returns
     -------
@@ -225,6 +243,8 @@ def sampled_coverage(
         seen = np.zeros((repeat[-1] + 1, states), bool)
         for here in walks:
             seen[repeat, here] = True
+        if own is not None:
+            seen[:, own] = True
         found.append(np.count_nonzero(seen[:, :niches], axis=1))
     return np.concatenate(found)
 

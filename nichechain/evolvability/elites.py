@@ -14,9 +14,9 @@ from nichechain.chain.model import NicheChain
 from nichechain.core.checks import check_positive
 from nichechain.core.errors import NichechainError
 from nichechain.core.randomness import Purpose, keyed
-from nichechain.evolvability.averaging import ENDLESS, SATURATED, summary
+from nichechain.evolvability.averaging import ENDLESS, SATURATED, spread_of, summary
 from nichechain.evolvability.coverage import LinearOperator, expected_coverage
-from nichechain.evolvability.question import DRAWS, Convention, Question
+from nichechain.evolvability.question import DRAWS, Convention, Question, dense
 from nichechain.evolvability.record import draw_known, own_strength, recorded_children
 
 if TYPE_CHECKING:
@@ -82,14 +82,18 @@ def elite_evolvability(
     strength = own_strength(chain) if strength is None else strength
     children = recorded_children(archive, elites.uid)
     means, saturated = [], False
-    for number, matrix in enumerate(question.transitions(chain, redraw=True)):
+    for number, drawn in enumerate(question.samples(chain, redraw=True)):
         rng = keyed(seed, Purpose.FIRST_GENERATION, number)
         known, shares = draw_known(children, rng, strength)
-        first = _FirstRows(shares, 1.0 - known, matrix, elites.niche)
-        covered = expected_coverage(matrix, first, question.steps, [lineages, ENDLESS], counted=n)
+        first: LinearOperator = _FirstRows(shares, 1.0 - known, drawn.rows, elites.niche)
+        if drawn.concentration is not None:
+            first = shares.toarray() + (1.0 - known)[:, None] * dense(drawn.children(elites.niche))
+        covered = expected_coverage(drawn.onward, first, question.steps, [lineages, ENDLESS], counted=n)
         saturated |= bool(np.median(covered[:, 0] / np.maximum(covered[:, 1], 1e-300)) > SATURATED)
         means.append(covered[:, 0])
-    value, error, low, high = summary(np.array(means), np.zeros((len(means), len(elites))))
+    value, error, low, high = summary(
+        np.array(means), np.zeros((len(means), len(elites))), spread_of(chain), n
+    )
     births = np.full(n, -1) if chain.births is None else chain.births
     frame = pd.DataFrame(
         {

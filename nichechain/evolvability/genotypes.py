@@ -122,12 +122,12 @@ def genotype_evolvability(
 
     def samples() -> Iterator[Sample]:
         # Where T is given, D is not, if it has to be guessed.
-        for number, matrix in enumerate(question.transitions(chain, redraw=guessed)):
+        for number, drawn in enumerate(question.samples(chain, redraw=guessed)):
             if guessed:
                 rng = keyed(seed, Purpose.FIRST_GENERATION, number)
-                yield matrix, draw_children(counts, root.children(matrix), rng, strength)
+                yield drawn.onward, draw_children(counts, root.children(drawn), rng, strength)
             else:
-                yield matrix, counts / observed
+                yield drawn.onward, counts / observed
 
     result = one_root(chain, samples(), question, question.repeats_of_each(chain, redraw=guessed))
     result = replace(result, births=root.births, recorded=recorded, offspring=observed - recorded)

@@ -7,13 +7,20 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy import sparse
 
-from nichechain.chain.model import NicheChain, Transition
+from nichechain.chain.model import NicheChain
 from nichechain.core.randomness import Purpose, keyed
-from nichechain.evolvability.averaging import ENDLESS, SATURATED, one_root, standard_error, summary
+from nichechain.evolvability.averaging import (
+    ENDLESS,
+    SATURATED,
+    one_root,
+    spread_of,
+    standard_error,
+    summary,
+    widened,
+)
 from nichechain.evolvability.coverage import expected_coverage, sampled_coverage
-from nichechain.evolvability.question import DRAWS, Convention, Method, Question, Root
+from nichechain.evolvability.question import DRAWS, Convention, Method, Question, Root, dense
 from nichechain.evolvability.results import Evolvability, NicheEvolvability
 from nichechain.evolvability.urns import simulated_coverage
 from nichechain.niches import Niche
@@ -86,8 +93,9 @@ def answer(chain: NicheChain, root: Root, question: Question) -> Evolvability:
     """What :func:`l_evolvability` answers to a question that has been checked."""
     if question.by_urns(chain):
         return replace(_one_by_urns(chain, root, question), births=root.births)
-    samples = ((matrix, root.first(matrix, question)) for matrix in question.transitions(chain))
-    result = one_root(chain, samples, question, question.repeats_of_each(chain))
+    own = root.visited(question)
+    samples = ((drawn.onward, root.children(drawn)) for drawn in question.samples(chain))
+    result = one_root(chain, samples, question, question.repeats_of_each(chain), own)
     return replace(result, births=root.births)
 
 
@@ -139,32 +147,43 @@ def answer_for_niches(
     tell : callable, optional
         Told how many draws of T are done.
     """
-    n, steps, lineages = chain.n_niches, question.steps, question.lineages
+    n, lineages = chain.n_niches, question.lineages
     asked = np.arange(n) if roots is None else roots
     if question.by_urns(chain):
         return _by_urns(chain, question, asked, tell)
     size = question.repeats_of_each(chain)
-    standing = sparse.eye_array(chain.states, format="csr")
+    own = asked if question.root_counts else None
     means, errors, saturated = [], [], False
-    for number, matrix in enumerate(question.transitions(chain)):
-        first: Transition = (standing if question.root_counts else matrix)[asked]
+    for number, drawn in enumerate(question.samples(chain)):
+        first = drawn.children(asked)
         if question.method != "monte-carlo":
-            covered = expected_coverage(matrix, first, steps, [lineages, ENDLESS], counted=n)
+            covered = expected_coverage(
+                drawn.onward, first, question.l, [lineages, ENDLESS], counted=n, own=own
+            )
             share = covered[:, 0] / np.maximum(covered[:, 1], 1e-300)
             saturated |= bool(np.median(share) > SATURATED)
             means.append(covered[:, 0])
             errors.append(np.zeros(asked.size))
         else:
             rng = keyed(question.seed, Purpose.WALKS, number)
-            starts = (Root(chain, niche=int(niche)).first(matrix, question) for niche in asked)
             sampled = [
-                sampled_coverage(matrix, start, steps, lineages, size, rng, counted=n) for start in starts
+                sampled_coverage(
+                    drawn.onward,
+                    start,
+                    question.l,
+                    lineages,
+                    size,
+                    rng,
+                    counted=n,
+                    own=int(niche) if question.root_counts else None,
+                )
+                for niche, start in zip(asked, dense(first), strict=True)
             ]
             means.append(np.mean(sampled, axis=1))
             errors.append(np.array([standard_error(walks) for walks in sampled]))
         if tell is not None:
             tell(number + 1)
-    figures = summary(np.array(means), np.array(errors))
+    figures = summary(np.array(means), np.array(errors), spread_of(chain), n)
     method = "exact" if question.method == "auto" else question.method
     return _of_all(chain, question, asked, figures, method, saturated)
 
@@ -202,7 +221,8 @@ def _by_urns(
 ) -> NicheEvolvability:
     assert chain.posterior is not None
     found = simulated_coverage(chain.posterior, question, [question.lineages], roots=asked, tell=tell)
-    figures = found.summary()
+    value, error, low, high = found.summary()
+    figures = value, error, *widened(value, low, high, spread_of(chain), chain.n_niches)
     # Where nothing is impossible, lineages without end visit every niche.
     saturated = bool(np.median(figures[0]) > SATURATED * chain.n_niches)
     return _of_all(chain, question, asked, figures, URNS, saturated)
@@ -212,7 +232,9 @@ def _one_by_urns(chain: NicheChain, root: Root, question: Question) -> Evolvabil
     assert chain.posterior is not None
     start = {"offspring": root.distribution} if root.state is None else {"roots": np.array([root.state])}
     found = simulated_coverage(chain.posterior, question, [question.lineages], **start)
-    value, error, low, high = (float(figure[0]) for figure in found.summary())
+    means, errors, lowest, highest = found.summary()
+    bounds = widened(means, lowest, highest, spread_of(chain), chain.n_niches)
+    value, error, low, high = (float(figure[0]) for figure in (means, errors, *bounds))
     return Evolvability(
         value,
         error,

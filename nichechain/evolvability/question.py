@@ -10,6 +10,7 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from nichechain.chain.lineages import scattered_rows
 from nichechain.chain.model import NicheChain, Transition
 from nichechain.core.checks import as_floats, check_at_least, check_choice, check_seed
 from nichechain.core.errors import NichechainError
@@ -17,6 +18,7 @@ from nichechain.core.randomness import Purpose, keyed
 from nichechain.niches import Niche
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
 Method = Literal["auto", "exact", "monte-carlo"]
 Convention = Literal["definition", "procedure"]
 
@@ -27,6 +29,41 @@ MOST_EXACT = 1_000
 
 # Lineages that are longer or more numerous cost more to simulate than their closed form.
 _LONGEST, _MOST_LINEAGES = 1_000, 10_000
+
+
+@dataclass(frozen=True)
+class DrawnChain:
+    """One T that births allow, and what lineages do by it.
+
+    Parameters
+    ----------
+    rows : (S, S) array, scipy.sparse.csr_array or PooledTransition
+        T: where children of a niche's elites land.
+    onward : (S, S) array, scipy.sparse.csr_array or PooledTransition
+        Rows that generations after the first are drawn from; T itself where births tell nothing of
+        lineages.
+    concentration : float, optional
+        α, where an elite has a distribution of its own for its children, Dirichlet(α T_i).
+    rng : numpy.random.Generator
+        For these distributions.
+    """
+
+    rows: Transition
+    onward: Transition
+    concentration: float | None
+    rng: np.random.Generator
+
+    def children(self, states: Ints) -> Transition:
+        """Distributions of generation 1 of elites in some states, (m, S)."""
+        some = self.rows[states]
+        return (
+            some if self.concentration is None else scattered_rows(dense(some), self.concentration, self.rng)
+        )
+
+
+def dense(matrix: Transition) -> Floats:
+    """A matrix as an array."""
+    return matrix if isinstance(matrix, np.ndarray) else matrix.toarray()
 
 
 @dataclass(frozen=True)
@@ -81,6 +118,10 @@ class Question:
         """States of a lineage that count: l, and the root's own where it does."""
         return self.l + self.root_counts
 
+    def drawn_steps(self, own: int | None) -> int:
+        """States of a lineage that are drawn: those that count, but for a root's own that is known."""
+        return self.steps - (own is not None)
+
     def by_urns(self, chain: NicheChain) -> bool:
         """Whether rows of T are only drawn where lineages enter them, since there are many."""
         small = chain.states <= MOST_EXACT or self.l > _LONGEST or self.lineages > _MOST_LINEAGES
@@ -106,6 +147,24 @@ class Question:
                 yield chain.operator
             else:
                 yield chain.posterior.draw(keyed(self.seed, Purpose.POSTERIOR, number))
+
+    def samples(self, chain: NicheChain, *, redraw: bool = False) -> Iterator[DrawnChain]:
+        """The same, each with what lineages do by it.
+
+        Yields
+        ------
+        DrawnChain
+            What it adds to draw k comes from ``keyed(seed, Purpose.LINEAGE_LAW, k)``.
+        """
+        law = None if chain.posterior is None else chain.posterior.law
+        for number, transition in enumerate(self.transitions(chain, redraw=redraw)):
+            rng = keyed(self.seed, Purpose.LINEAGE_LAW, number)
+            if law is None:
+                yield DrawnChain(transition, transition, None, rng)
+            else:
+                assert chain.posterior is not None
+                onward = law.onward(transition, rng)
+                yield DrawnChain(transition, onward, chain.posterior.elite_concentration, rng)
 
     def repeats_of_each(self, chain: NicheChain, *, redraw: bool = False) -> int:
         """Simulations on each of :meth:`transitions`, so that all have as many as asked for."""
@@ -146,18 +205,15 @@ class Root:
         else:
             self.distribution[self.state] = 1.0
 
-    def first(self, transition: Transition, question: Question) -> Floats:
-        """Distribution of the first state that counts, (S,): the root's own, or its child's."""
-        return self.distribution if question.root_counts else self.children(transition)
+    def visited(self, question: Question) -> int | None:
+        """The root's own state, where it is one of those that count."""
+        return self.state if question.root_counts else None
 
-    def children(self, transition: Transition) -> Floats:
+    def children(self, drawn: DrawnChain) -> Floats:
         """Distribution of generation 1, (S,)."""
         if self.state is None:
             return self.distribution
-        if isinstance(transition, np.ndarray):
-            row: Floats = transition[self.state]
-        else:
-            row = transition[[self.state]].toarray()[0]
+        row: Floats = dense(drawn.children(np.array([self.state])))[0]
         return row
 
 

@@ -126,8 +126,11 @@ def reach(
     n = chain.n_niches
     visits, descendants = [], []
     some: list[Floats] = []
-    for transition in question.transitions(chain):
-        visit, passes = visit_probability(transition, root.first(transition, question), question.steps)
+    own = root.visited(question)
+    for drawn in question.samples(chain):
+        visit, passes = visit_probability(drawn.onward, root.children(drawn), question.drawn_steps(own))
+        if own is not None:
+            visit[own], passes[own] = 1.0, passes[own] + 1.0
         visits.append(visit[:n])
         descendants.append(lineages * passes[:n])
         some.extend(at_least_once(visit[:n], [lineages]))

@@ -1,9 +1,6 @@
-"""l-evolvability of estimated chains whatever their size: lineages that draw rows of T as they need them.
+"""l-evolvability of estimated chains whatever their size: lineages draw rows of T as they enter them.
 
-A row of T that is Dirichlet(C + s B) need not be drawn to draw children from it. Given k children so far, the
-next is one of the C births with weight C, a copy of one of the k with weight k, or a new one from B with
-weight s: Pólya's urn (Blackwell and MacQueen 1973). So all lineages of a root live on the same T, of which
-only those rows come to be that they enter. Cost follows descendants, not niches, and no row is cut short.
+See :mod:`nichechain.chain.urns`: cost follows descendants, not niches.
 """
 
 from __future__ import annotations
@@ -16,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from nichechain.chain.lineages import urns_of
 from nichechain.core.intervals import drawn_interval
 from nichechain.core.randomness import Purpose, keyed
 
@@ -31,7 +29,6 @@ Ints = NDArray[np.int64]
 _WORTHWHILE = 200_000
 # Descendants that are kept at once.
 _DESCENDANTS = 4_000_000
-_ABSENT = -1
 
 
 @dataclass(frozen=True)
@@ -121,7 +118,7 @@ def simulated_coverage(
     noise = np.empty_like(coverage)
     for draw in range(question.draws):
         rng = keyed(question.seed, Purpose.WALKS, draw)
-        urns = Urns(posterior.settled(keyed(question.seed, Purpose.POSTERIOR, draw)))
+        urns = urns_of(posterior, keyed(question.seed, Purpose.POSTERIOR, draw))
         for start in range(0, m, at_once):
             block = slice(start, min(start + at_once, m))
             if roots is None:
@@ -129,43 +126,13 @@ def simulated_coverage(
                 first = rng.choice(offspring.size, (1, lineages), p=offspring / offspring.sum())
             else:
                 first = np.repeat(roots[block], lineages).reshape(-1, lineages)
-            states = urns.walks(first.astype(np.int64), moves, rng)
+            states = urns.walks(first.astype(np.int64), moves, rng, roots=roots is not None)
             coverage[draw, block], noise[draw, block] = _covered(
                 states[:, 0 if counts_first else lineages :], lineages, sizes, urns.niches
             )
         if tell is not None:
             tell(draw + 1)
     return Simulated(coverage, noise)
-
-
-class Urns:
-    """Rows of T as urns."""
-
-    def __init__(self, posterior: DirichletPosterior) -> None:
-        self.niches = len(posterior.counts.niches)
-        self._base, self._strength = posterior.base, posterior.strength
-        weights = posterior.weights
-        self._start, self._column = weights.indptr.astype(np.int64), weights.indices.astype(np.int64)
-        self._upto = np.concatenate([[0.0], np.cumsum(weights.data)])
-        self._stays = weights.shape[0] - 1 if posterior.absorbing else _ABSENT
-
-    def walks(self, first: Ints, moves: int, rng: np.random.Generator) -> Ints:
-        """States of lineages of some roots (g, M), generation after generation: (g, (moves + 1) M)."""
-        from nichechain.evolvability import urn_steps
-
-        g, lineages = first.shape
-        states = np.empty((g, (moves + 1) * lineages), np.int64)
-        states[:, :lineages] = first
-        tables = self._start, self._column, self._upto, self._strength, self._stays
-        for move in range(moves):
-            origin = np.empty((g, lineages), np.int64)
-            urn_steps.choose(*tables, states, move * lineages, rng.random((g, lineages)), origin)
-            new = origin == _ABSENT
-            here = states[:, move * lineages : (move + 1) * lineages]
-            fresh = np.empty((g, lineages), np.int64)
-            fresh[new] = self._base.sample(here[new], rng)
-            urn_steps.resolve(origin, fresh, states, (move + 1) * lineages)
-        return states
 
 
 def _covered(states: Ints, lineages: int, sizes: list[int], niches: int) -> tuple[Floats, Floats]:

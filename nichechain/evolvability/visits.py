@@ -113,12 +113,12 @@ def visit_metrics(
     question = Question(l, lineages, convention, repeats=repeats, draws=draws, seed=seed)
     root = Root(chain, niche=niche, offspring=offspring)
     size = question.repeats_of_each(chain)
-    start = None if question.root_counts else root.state
+    own = root.visited(question)
+    steps = question.drawn_steps(own)
     samples = []
-    for number, transition in enumerate(question.transitions(chain)):
+    for number, drawn in enumerate(question.samples(chain)):
         rng = keyed(seed, Purpose.WALKS, number)
-        first = root.first(transition, question)
-        walks = _walks(transition, first, start, question.steps, lineages, size, rng, chain)
+        walks = _walks(drawn.onward, root, root.children(drawn), own, steps, lineages, size, rng, chain)
         samples.append(np.concatenate(list(walks), axis=1))
     found = np.stack(samples)
     coverage, uniformity, occupied, entropy, distance = (_estimate(found[:, k]) for k in range(5))
@@ -199,8 +199,9 @@ def _bits(shares: Floats) -> Floats:
 
 def _walks(
     transition: Transition,
+    root: Root,
     first: Floats,
-    start: int | None,
+    own: int | None,
     steps: int,
     lineages: int,
     repeats: int,
@@ -213,13 +214,15 @@ def _walks(
         size = repeat[-1] + 1
         visits = np.zeros(size * chain.states, np.int64)
         length = np.zeros(repeat.size)
-        before = None if start is None else np.full(repeat.size, start)
+        before = None if root.state is None else np.full(repeat.size, root.state)
         for here in walks:
             if before is not None:
                 length += _apart(centers, before, here)
             visits += np.bincount(repeat * chain.states + here, minlength=visits.size)
             before = here
         counts = visits.reshape(size, chain.states)[:, : chain.n_niches]
+        if own is not None and own < chain.n_niches:
+            counts[:, own] += lineages
         yield np.stack(
             [
                 np.count_nonzero(counts, axis=1),

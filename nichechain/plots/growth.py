@@ -14,7 +14,7 @@ from nichechain.core.errors import NichechainError
 from nichechain.core.intervals import drawn_interval
 from nichechain.evolvability.averaging import ENDLESS, SATURATED
 from nichechain.evolvability.coverage import coverage_by_generation
-from nichechain.evolvability.question import Question
+from nichechain.evolvability.question import Question, dense
 from nichechain.niches import Niche
 from nichechain.plots.style import EDGE, INK, LONG_JUMP, START
 
@@ -118,8 +118,15 @@ def _covered(chain: NicheChain, niches: Sequence[Niche], question: Question, lin
     roots = [chain.state(niche) for niche in niches]
     return np.array(
         [
-            coverage_by_generation(matrix, roots, question.l, lineages, chain.n_niches)
-            for matrix in question.transitions(chain)
+            coverage_by_generation(
+                drawn.onward,
+                roots,
+                question.l,
+                lineages,
+                chain.n_niches,
+                first=dense(drawn.children(np.array(roots))),
+            )
+            for drawn in question.samples(chain)
         ]
     )
 

@@ -20,8 +20,9 @@ from nichechain.chain.model import NicheChain
 from nichechain.core.intervals import drawn_interval
 from nichechain.core.randomness import Purpose, keyed
 from nichechain.core.row_sampler import RowSampler
+from nichechain.evolvability.averaging import spread_of
 from nichechain.evolvability.coverage import expected_coverage, rarefied_coverage
-from nichechain.evolvability.question import Question
+from nichechain.evolvability.question import Question, dense
 from nichechain.evolvability.record import draw_children, own_strength
 from nichechain.niches import Niches
 from nichechain.validation.rollouts import Lineages, niches_reached
@@ -45,14 +46,14 @@ class Prediction:
         ``niche`` or ``genotype``: whose offspring are generation 1.
     value : (R, l) float64 array
         Expected number up to each generation, the mean over draws of T.
-    simulated : (R, l, K) int64 array
+    simulated : (R, l, K) float64 array
         Numbers of simulated checks: what births leave unknown of T, and chance, are both in
         their spread.
     """
 
     start: str
     value: Floats
-    simulated: Ints
+    simulated: Floats
 
     @property
     def interval(self) -> tuple[Floats, Floats]:
@@ -180,8 +181,8 @@ def compare(
     strength = own_strength(chain)
     values: list[Floats] = []
     simulated: list[Ints] = []
-    for number, matrix in enumerate(question.transitions(chain, redraw=True)):
-        rows = matrix[lineages.roots] if isinstance(matrix, np.ndarray) else matrix[lineages.roots].toarray()
+    for number, drawn in enumerate(question.samples(chain, redraw=True)):
+        matrix, rows = drawn.onward, dense(drawn.children(lineages.roots))
         rng = keyed(seed, Purpose.FIRST_GENERATION, number)
         first = np.concatenate([rows, draw_children(counts, rows, rng, strength)])
         values.append(
@@ -194,7 +195,9 @@ def compare(
         walks = simulate_lineages(matrix, begin.reshape(-1, size), generations, rng)
         simulated.append(niches_reached(walks, n).reshape(_REPLICAS, 2 * roots, generations))
     value = np.mean(values, axis=0)
-    spread = np.moveaxis(np.concatenate(simulated), 0, 2)
+    spread = np.moveaxis(np.concatenate(simulated), 0, 2).astype(np.float64)
+    middle = spread.mean(axis=2, keepdims=True)
+    spread = np.clip(middle + spread_of(chain) * (spread - middle), 0.0, n)
     genotype = value[roots:]
     if size <= counts.sum(axis=1).min():
         # No distribution has to be guessed: these are children, and there are enough of them.
@@ -212,7 +215,7 @@ def compare(
     )
 
 
-def _spearmans(real: NDArray[np.int64], value: Floats) -> Floats:
+def _spearmans(real: Floats, value: Floats) -> Floats:
     """Rank correlation of each column of (R, K) with (R,); NaN where either is constant."""
     from scipy.stats import rankdata
 
