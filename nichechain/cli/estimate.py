@@ -224,8 +224,10 @@ def _course(command: EstimateCommand, archive: Archive) -> LevelCourse | None:
     if archive.niches.states > MOST_EXACT:
         return None
     births = read_births(archive.folder, archive.meta)
+    posterior = archive.chain().posterior
+    law = None if posterior is None else posterior.law
     try:
-        return level_course(births, archive.niches, seed=command.seed)
+        return level_course(births, archive.niches, seed=command.seed, law=law)
     except NichechainError:
         return None
 

@@ -94,7 +94,7 @@ def run(arguments: Sequence[str]) -> int:
     frame["uncertainty"] = command.uncertainty
     if command.uncertainty != "posterior":
         _set_band(frame, command, archive)
-    _write(frame, command, _drift(command, archive))
+    _write(frame, command, _drift(command, archive, chain))
     return 0
 
 
@@ -222,7 +222,7 @@ def _best(command: EvolvabilityCommand, chain: NicheChain) -> pd.DataFrame:
     return frame
 
 
-def _drift(command: EvolvabilityCommand, archive: Archive) -> str:
+def _drift(command: EvolvabilityCommand, archive: Archive, chain: NicheChain) -> str:
     """What to say where early and late births disagree on the level, else nothing."""
     from nichechain.archive.read import read_births
     from nichechain.evolvability.question import MOST_EXACT
@@ -232,8 +232,10 @@ def _drift(command: EvolvabilityCommand, archive: Archive) -> str:
     if command.format != "table" or archive.niches.states > MOST_EXACT:
         return ""
     births = read_births(archive.folder, archive.meta)
+    law = None if chain.posterior is None else chain.posterior.law
+    asked = {"l": command.l, "lineages": command.lineages, "seed": command.seed}
     try:
-        found = level_drift(births, archive.niches, l=command.l, lineages=command.lineages, seed=command.seed)
+        found = level_drift(births, archive.niches, **asked, law=law)
     except NichechainError:
         # Too few births to say so, or births without a step.
         return ""

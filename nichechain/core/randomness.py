@@ -57,6 +57,8 @@ class Purpose(IntEnum):
     """Which elites (index 0) and which births (index 1) of an archive are evaluated again."""
     LINEAGE_LAW = 40
     """Lineages simulated to see how far those of one elite overlap."""
+    ELITE_ROW = 41
+    """What one elite's children are drawn from; index: the draw of T and the state."""
     TESSELLATION = 30
     """Uniform samples that a Voronoi tessellation is made of."""
 

@@ -44,21 +44,31 @@ class DrawnChain:
         lineages.
     concentration : float, optional
         α, where an elite has a distribution of its own for its children, Dirichlet(α T_i).
-    rng : numpy.random.Generator
-        For these distributions.
+    seed, number : int
+        Of the question, and of the draw.
     """
 
     rows: Transition
     onward: Transition
     concentration: float | None
-    rng: np.random.Generator
+    seed: int
+    number: int
 
     def children(self, states: Ints) -> Transition:
-        """Distributions of generation 1 of elites in some states, (m, S)."""
-        some = self.rows[states]
-        return (
-            some if self.concentration is None else scattered_rows(dense(some), self.concentration, self.rng)
-        )
+        """Distributions of generation 1 of elites in some states, (m, S).
+
+        That of a state is drawn from ``keyed(seed, Purpose.ELITE_ROW, number * S + state)``, whatever other
+        states are asked for.
+        """
+        some: Transition = self.rows[states]
+        if self.concentration is None:
+            return some
+        own = dense(some).copy()
+        first = self.number * self.rows.shape[0]
+        for place, state in enumerate(states.tolist()):
+            rng = keyed(self.seed, Purpose.ELITE_ROW, first + state)
+            own[place] = scattered_rows(own[place], self.concentration, rng)
+        return own
 
 
 def dense(matrix: Transition) -> Floats:
@@ -158,13 +168,13 @@ class Question:
         """
         law = None if chain.posterior is None else chain.posterior.law
         for number, transition in enumerate(self.transitions(chain, redraw=redraw)):
-            rng = keyed(self.seed, Purpose.LINEAGE_LAW, number)
             if law is None:
-                yield DrawnChain(transition, transition, None, rng)
+                yield DrawnChain(transition, transition, None, self.seed, number)
             else:
                 assert chain.posterior is not None
-                onward = law.onward(transition, rng)
-                yield DrawnChain(transition, onward, chain.posterior.elite_concentration, rng)
+                onward = law.onward(transition, keyed(self.seed, Purpose.LINEAGE_LAW, number))
+                concentration = chain.posterior.elite_concentration
+                yield DrawnChain(transition, onward, concentration, self.seed, number)
 
     def repeats_of_each(self, chain: NicheChain, *, redraw: bool = False) -> int:
         """Simulations on each of :meth:`transitions`, so that all have as many as asked for."""

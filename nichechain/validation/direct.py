@@ -111,7 +111,7 @@ class DirectCheck:
                         "generation": k + 1,
                         "reached": real.mean(),
                         "predicted": value.mean(),
-                        "spearman": float(_spearmans(real[:, None], value)[0]),
+                        "spearman": float(_spearmans(real[:, None].astype(np.float64), value)[0]),
                         "spearman_expected": np.median(ideal),
                         "spearman_low": spearman_low,
                         "spearman_high": spearman_high,

@@ -7,18 +7,20 @@ l-evolvability over niches.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
 import pyarrow as pa
+import pyarrow.compute as pc
 from numpy.typing import NDArray
 from scipy.special import stdtrit
 
-from nichechain.births.table import check_columns
+from nichechain.births.table import LINEAGE, check_columns
 from nichechain.chain.counts import TransitionCounts
-from nichechain.chain.estimators import estimate
+from nichechain.chain.estimators import estimate, with_posterior
 from nichechain.chain.filters import counts_of
+from nichechain.chain.lineages import LineageLaw
 from nichechain.core.checks import check_at_least
 from nichechain.core.errors import NichechainError
 from nichechain.core.randomness import Purpose, keyed
@@ -138,6 +140,7 @@ def level_drift(
     min_births: int = _MIN_BIRTHS,
     draws: int = 3,
     seed: int = 0,
+    law: LineageLaw | None = None,
 ) -> LevelDrift:
     """Compare the level by early births with that by late ones, cheaply.
 
@@ -152,6 +155,8 @@ def level_drift(
     draws : int
         Posterior draws of T of each half, at least 2.
     seed : int
+    law : LineageLaw, optional
+        What lineages do by either T, such as ``chain.posterior.law`` of all births.
 
     Returns
     -------
@@ -173,7 +178,7 @@ def level_drift(
     check_at_least(2, draws=draws)
     halves, _ = _parts(births, niches, 2)
     compared = _observed(halves, min_births)
-    early, late = (_levels(half, compared, question, number) for number, half in enumerate(halves))
+    early, late = (_levels(half, compared, question, number, law) for number, half in enumerate(halves))
     difference = float(late.mean() - early.mean())
     spread = np.sqrt((early.var(ddof=1) + late.var(ddof=1)) * (1.0 + 1.0 / draws))
     width = float(stdtrit(2 * (draws - 1), 0.5 + _LEVEL / 2) * spread)
@@ -199,12 +204,13 @@ def level_course(
     min_births: int = _MIN_BIRTHS,
     draws: int = 8,
     seed: int = 0,
+    law: LineageLaw | None = None,
 ) -> LevelCourse:
     """Level against steps, and against the number of births.
 
     Parameters
     ----------
-    births, niches, l, lineages, seed
+    births, niches, l, lineages, seed, law
         As in :func:`level_drift`.
     parts : int
         Parts of equally many births, at least 2.
@@ -231,7 +237,9 @@ def level_course(
         grown.append(grown[-1] + some)
     rows = []
     for number, (own, so_far) in enumerate(zip(counts, grown, strict=True)):
-        levels = [_levels(some, compared, question, 2 * number + k) for k, some in enumerate((own, so_far))]
+        levels = [
+            _levels(some, compared, question, 2 * number + k, law) for k, some in enumerate((own, so_far))
+        ]
         rows.append([_interval(x) for x in levels])
     (level, low, high), (grown_level, grown_low, grown_high) = np.moveaxis(np.array(rows), 0, 2)
     return LevelCourse(
@@ -261,25 +269,21 @@ def _interval(levels: Floats) -> tuple[float, float, float]:
 def _parts(births: pa.Table, niches: Niches, parts: int) -> tuple[list[TransitionCounts], Ints]:
     """Counts of equally many births each, in the order of steps, and their first and last step (P, 2).
 
-    Births of unselected lineages are shared out alike, in their own order: a calibration adds them all at the
-    end, and parts are to differ by what the search did.
+    Those of unselected lineages are left out: parts are to differ by what the search did.
     """
     check_columns(births, *_COLUMNS)
+    if LINEAGE in births.column_names:
+        births = births.filter(pc.invert(births[LINEAGE].fill_null(False)))
     missing = births["step"].null_count
     if missing or not len(births):
         raise NichechainError(
             f"{missing} of {len(births)} births do not say their step: no early and late ones"
         )
     step = births["step"].to_numpy().astype(np.int64)
-    flagged = np.zeros(step.size, bool)
-    if "lineage" in births.column_names:
-        flagged = births["lineage"].fill_null(False).to_numpy()
     part = np.empty(step.size, np.int64)
-    for kind in (flagged, ~flagged):
-        order = np.flatnonzero(kind)[np.argsort(step[kind], kind="stable")]
-        part[order] = np.arange(order.size) * parts // max(1, order.size)
+    part[np.argsort(step, kind="stable")] = np.arange(step.size) * parts // step.size
     counts = [counts_of(births.filter(pa.array(part == number)), niches) for number in range(parts)]
-    inside = [step[~flagged & (part == number)] for number in range(parts)]
+    inside = [step[part == number] for number in range(parts)]
     steps = [(some.min(initial=step.max()), some.max(initial=0)) for some in inside]
     return counts, np.array(steps)
 
@@ -298,17 +302,20 @@ def _observed(counts: list[TransitionCounts], min_births: int) -> Ints:
     return compared
 
 
-def _levels(counts: TransitionCounts, compared: Ints, question: Question, number: int) -> Floats:
+def _levels(
+    counts: TransitionCounts, compared: Ints, question: Question, number: int, law: LineageLaw | None
+) -> Floats:
     """Mean l-evolvability over niches, by each draw of T, (draws,)."""
     posterior = estimate(counts).posterior
     assert posterior is not None
+    chain = with_posterior(counts, replace(posterior, law=law), "early or late")
     # Draws of their own: parts must not agree for having been drawn alike.
-    rng = keyed(question.seed, Purpose.RESAMPLING, number)
+    seed = int(keyed(question.seed, Purpose.RESAMPLING, number).integers(2**31))
     found = []
-    for _ in range(question.draws):
-        T = posterior.draw(rng)
+    for drawn in replace(question, seed=seed).samples(chain):
+        first = drawn.children(compared)
         covered = expected_coverage(
-            T, T[compared], question.steps, question.lineages, counted=len(counts.niches)
+            drawn.onward, first, question.l, question.lineages, counted=len(counts.niches)
         )
         found.append(covered.mean())
     return np.array(found)

@@ -29,7 +29,9 @@ from nichechain.validation.grid_size import (
 @pytest.fixture(scope="module")
 def archive(tmp_path_factory):
     folder = tmp_path_factory.mktemp("sweep") / "arm"
-    config = nc.BuildConfig("arm", (8, 8), ((-1, 0.9), (-1, 1)), evaluations=1500, scale=0.2)
+    config = nc.BuildConfig(
+        "arm", (8, 8), ((-1, 0.9), (-1, 1)), evaluations=1500, scale=0.2, lineage_share=0.0
+    )
     with nc.Threads(1) as threads:
         nc.build(config, folder, threads)
     return nc.load(folder)
