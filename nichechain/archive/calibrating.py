@@ -29,7 +29,7 @@ from nichechain.core.errors import ArchiveError, NichechainError
 from nichechain.core.files import writing
 from nichechain.execution import Executor, Threads
 from nichechain.search import savings
-from nichechain.search.config import MOST_FAILED
+from nichechain.search.config import BROOD, MOST_FAILED
 from nichechain.search.elites import SearchState
 from nichechain.search.failures import Failures
 from nichechain.search.lineages import Calibration
@@ -41,13 +41,14 @@ def calibrate(
     rollouts: int | None = None,
     executor: Executor | None = None,
     *,
+    brood: int = BROOD,
     resume: bool = False,
     on_progress: Callable[[BuildProgress], None] | None = None,
     max_failed: float = MOST_FAILED,
 ) -> None:
     """Add births of unselected lineages to a finished archive.
 
-    Lineages begin at elites drawn uniformly and are as long as those of the build,
+    Lineages begin in broods, at elites drawn uniformly, and are as long as those of the build,
     ``config.lineage_length``. Their births count as all births do, and win niches by the same rule.
     The number of workers and interruptions change nothing. No build goes on with the archive
     afterwards. An archive that was opened before does not see the births: open it again.
@@ -60,8 +61,11 @@ def calibrate(
         How many births to add, at least 1; not given where ``resume`` is.
     executor : Executor, optional
         Where to evaluate; by default on threads, one per processor.
+    brood : int
+        Lineages that begin at the same elite, at least 1. Fewer do where rollouts are too few, or where
+        so many do not fit in a batch of the build.
     resume : bool
-        Go on with a calibration that was interrupted.
+        Go on with a calibration that was interrupted, with its own rollouts and brood.
     on_progress : callable, optional
     max_failed : float
         Share of births that may fail, from 0 to 1, once there are a hundred.
@@ -69,13 +73,14 @@ def calibrate(
     Raises
     ------
     NichechainError
-        If ``rollouts`` is out of range, or given or missing where it must not be, or if too many
-        births fail; what there is by then is committed.
+        If ``rollouts`` or ``brood`` is out of range, if ``rollouts`` is given or missing where it must
+        not be, or if too many births fail; what there is by then is committed.
     ArchiveError
         If the archive was imported or merged, is unfinished, damaged or being written, or if there
         is nothing to resume, or something to resume first.
     """
     _check_asked(rollouts, resume)
+    check_at_least(1, brood=brood)
     failures = Failures(max_failed)
     opened = archive if isinstance(archive, Archive) else Archive(Path(archive))
     folder = opened.folder
@@ -84,7 +89,7 @@ def calibrate(
     with writing(folder):
         # What may have been written since it was opened.
         meta, state = read.read_commit(folder)
-        calibrations = _begun(meta, folder, rollouts)
+        calibrations = _begun(meta, folder, rollouts, brood)
         last = calibrations[-1]
         if meta.births == last.first_uid:
             # Children that the budget did not reach are never born, and lineages begin anew.
@@ -129,7 +134,7 @@ def _check_can(meta: read.Meta, folder: Path) -> None:
         )
 
 
-def _begun(meta: read.Meta, folder: Path, rollouts: int | None) -> tuple[Calibration, ...]:
+def _begun(meta: read.Meta, folder: Path, rollouts: int | None, brood: int) -> tuple[Calibration, ...]:
     """All calibrations of the archive; the last is the one to go on with."""
     past = meta.calibrations
     missing = past[-1].end - meta.births if past else 0
@@ -141,4 +146,4 @@ def _begun(meta: read.Meta, folder: Path, rollouts: int | None) -> tuple[Calibra
         raise ArchiveError(
             f"{folder} has a calibration that lacks {missing} of its {past[-1].births} births: resume it"
         )
-    return (*past, Calibration(meta.step + 1, meta.births, rollouts))
+    return (*past, Calibration(meta.step + 1, meta.births, int(rollouts), int(brood)))

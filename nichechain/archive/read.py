@@ -262,7 +262,13 @@ def calibrations_of(values: dict[str, Any], births: int) -> tuple[Calibration, .
         If they do not follow one another up to the last birth.
     """
     found = tuple(
-        Calibration(int(each["first_step"]), int(each["first_uid"]), int(each["births"]))
+        Calibration(
+            int(each["first_step"]),
+            int(each["first_uid"]),
+            int(each["births"]),
+            # Before there were broods, each lineage began alone.
+            int(each.get("brood", 1)),
+        )
         for each in values.get("calibrations", ())
     )
     for each, later in pairwise(found):
@@ -271,6 +277,8 @@ def calibrations_of(values: dict[str, Any], births: int) -> tuple[Calibration, .
     for each in found:
         if not (0 < each.first_uid <= births and each.births > 0 and each.first_step > 0):
             raise ValueError(f"it has a calibration of {each.births} births from birth {each.first_uid} on")
+        if each.brood < 1:
+            raise ValueError(f"it has a calibration with broods of {each.brood} lineages")
     if found and births > found[-1].end:
         raise ValueError(f"its calibrations do not add up to {births} births")
     return found

@@ -10,14 +10,14 @@ from typing import Annotated
 import tyro
 
 from nichechain.cli import output, parsing, progress
-from nichechain.search.config import MOST_FAILED
+from nichechain.search.config import BROOD, MOST_FAILED
 
 
 @dataclass(frozen=True)
 class CalibrateCommand:
     """Add births of unselected lineages to a finished archive: they show what lineages do.
 
-    Lineages begin at elites drawn alike, so births go where lineages stand: most to the niches that
+    Lineages begin in broods at elites drawn alike, so births go where lineages stand: most to the niches that
     many descendants fall into, and outside. No build goes on with the archive afterwards.
     """
 
@@ -25,6 +25,8 @@ class CalibrateCommand:
     """Archive folder."""
     rollouts: Annotated[int | None, parsing.option("N", "none")] = None
     """How many births to add, such as 2000."""
+    brood: int = BROOD
+    """Lineages that begin at the same elite."""
     workers: parsing.Workers = None
     cache_memory: parsing.CacheMemory = None
     max_failed: float = MOST_FAILED
@@ -53,6 +55,7 @@ def run(arguments: Sequence[str]) -> int:
                     command.path,
                     command.rollouts,
                     executor,
+                    brood=command.brood,
                     resume=command.resume,
                     on_progress=tell,
                     max_failed=command.max_failed,

@@ -32,6 +32,9 @@ _MIXTURE = "'reach:0.7,uniform:0.3'"
 MOST_FAILED = 0.5
 """Share of births that may fail before a run is stopped, unless told otherwise."""
 
+BROOD = 10
+"""Lineages that begin at the same elite, unless told otherwise."""
+
 
 @dataclass(frozen=True)
 class SearchConfig:
@@ -80,6 +83,9 @@ class SearchConfig:
         they show what lineages do. With 0 all parents are selected.
     lineage_length : int
         Births of such a lineage, at least 2: the first is the child of an elite.
+    lineage_brood : int
+        Lineages that begin at the same elite: they show how much those of one elite have in common.
+        With 1 each begins at an elite of its own.
     replacement : {"random", "first", "newest", "objective"}
         Which birth of a niche is its elite: each alike, the first, the last, or the best.
     outside : {"state", "absorb", "clip"}
@@ -109,6 +115,7 @@ class SearchConfig:
     selection_lineages: int = 1
     lineage_share: float = 0.05
     lineage_length: int = 10
+    lineage_brood: int = BROOD
     replacement: Replacement = "random"
     outside: Outside = "state"
     seed: int = 0
@@ -153,8 +160,8 @@ class BuildConfig(SearchConfig):
 
     def __post_init__(self) -> None:
         whole = (
-            *("evaluations", "initial", "batch", "seed", "domain_seed", "niches_seed", "lineage_length"),
-            *("selection_l", "selection_lineages"),
+            *("evaluations", "initial", "batch", "seed", "domain_seed", "niches_seed"),
+            *("lineage_length", "lineage_brood", "selection_l", "selection_lineages"),
         )
         for name in whole:
             try:
@@ -192,6 +199,7 @@ class BuildConfig(SearchConfig):
                 f"lineage_share is {self.lineage_share:g}, but must be a share of births, from 0 to below 1"
             )
         check_at_least(2, lineage_length=self.lineage_length)
+        check_at_least(1, lineage_brood=self.lineage_brood)
         check_choice("replacement", self.replacement, get_args(Replacement))
         check_choice("niches", self.niches, get_args(NichesKind))
         if self.niches == "cvt" and len(self.shape) != 1:
@@ -227,8 +235,8 @@ class BuildConfig(SearchConfig):
             raise NichechainError(
                 f"the configuration has missing or unknown values: {', '.join(sorted(odd))}"
             )
-        # Before there were lineages, builds had none.
-        return cls(**{"lineage_share": 0.0, **values})
+        # Before there were lineages, builds had none, and before there were broods, each began alone.
+        return cls(**{"lineage_share": 0.0, "lineage_brood": 1, **values})
 
 
 def parse_selection(text: str) -> tuple[tuple[SelectionName, float], ...]:

@@ -9,6 +9,10 @@ any; those after it are flagged in the column ``lineage`` of the births. After s
 a birth can be nobody's parent because it failed or because outside is never left, the next lineage
 begins in its place. A birth of a lineage enters the archive by the rule that all births enter by.
 
+Lineages come in broods, of several that begin at the same elite in the same step and go on side by side.
+So births show not only where lineages go, but how much those of one elite have in common: how many niches
+they reach together depends on both.
+
 Which births of a step belong to which lineage follows from the number of the step alone, so there is
 nothing to draw, and nothing to remember but the latest birth of each lineage under way.
 """
@@ -16,6 +20,7 @@ nothing to draw, and nothing to remember but the latest birth of each lineage un
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from math import ceil
 
 import numpy as np
@@ -83,6 +88,9 @@ class Stretch:
         How many of them are of lineages, from 0 to 1: the last ones of each step.
     length : int
         Births of a lineage, the first among them.
+    brood : int
+        Lineages that begin at the same elite, if so many fit in a step: their births of a generation
+        are in one step.
     """
 
     first_step: int
@@ -90,11 +98,19 @@ class Stretch:
     batch: int
     share: float
     length: int
+    brood: int
 
     @classmethod
     def of_build(cls, config: BuildConfig) -> Stretch:
         """All steps of a build but that of the initial births."""
-        return cls(1, config.initial, config.batch, config.lineage_share, config.lineage_length)
+        return cls(
+            1,
+            config.initial,
+            config.batch,
+            config.lineage_share,
+            config.lineage_length,
+            config.lineage_brood,
+        )
 
     def uid(self, step: int) -> int:
         """Number of the first birth of a step."""
@@ -111,14 +127,40 @@ class Stretch:
         """
         slot = np.full(self.batch, NONE, np.int64)
         goes_on = np.zeros(self.batch, bool)
-        due = round(self.share * self.batch, _DIGITS)
+        size, due = self._broods
         turn = step - self.first_step
+        # A generation of a brood has one number, and broods take turns.
         number = np.arange(int(due * turn), int(due * (turn + 1)))
         if number.size:
-            slots = ceil(due)
-            slot[-number.size :] = number % slots
-            goes_on[-number.size :] = number // slots % self.length > 0
+            sets = ceil(due)
+            own = number.size * size
+            slot[-own:] = np.add.outer(number % sets * size, np.arange(size)).ravel()
+            goes_on[-own:] = np.repeat(number // sets % self.length > 0, size)
         return slot, goes_on
+
+    def drawing(self, step: int) -> Ints:
+        """Which birth of a step draws the elite that each begins at: where a brood begins, its first.
+
+        Returns
+        -------
+        (batch,) int64 array
+            Places within the step.
+        """
+        slot, goes_on = self.slots(step)
+        place = np.arange(self.batch)
+        return np.where((slot == NONE) | goes_on, place, place - slot % self._broods[0])
+
+    @cached_property
+    def _broods(self) -> tuple[int, float]:
+        """Lineages of a brood, and of how many broods a step has a generation, on average.
+
+        Broods are smaller than asked for where so many whole ones do not fit in a step.
+        """
+        for size in range(min(self.brood, self.batch), 1, -1):
+            due = round(self.share * self.batch / size, _DIGITS)
+            if ceil(due) * size <= self.batch:
+                return size, due
+        return 1, round(self.share * self.batch, _DIGITS)
 
 
 @dataclass(frozen=True)
@@ -131,11 +173,14 @@ class Calibration:
         Where they begin.
     births : int
         How many were asked for.
+    brood : int
+        Lineages that begin at the same elite, or fewer where so many do not fit.
     """
 
     first_step: int
     first_uid: int
     births: int
+    brood: int
 
     @property
     def end(self) -> int:
@@ -143,8 +188,13 @@ class Calibration:
         return self.first_uid + self.births
 
     def stretch(self, config: BuildConfig) -> Stretch:
-        """Its steps: at most a batch of lineages side by side, and none cut short that need not be."""
+        """Its steps: broods side by side, at most a batch, and no lineage cut short that need not be."""
         length = config.lineage_length
         lineages = ceil(self.births / length)
-        batch = ceil(lineages / ceil(lineages / config.batch))
-        return Stretch(self.first_step, self.first_uid, batch, 1.0, length)
+        largest = min(self.brood, config.batch)
+        broods = ceil(lineages / largest)
+        rounds = ceil(broods / (config.batch // largest))
+        abreast = ceil(broods / rounds)
+        # Where lineages do not make whole broods, all are a little smaller rather than one the rest.
+        brood = ceil(lineages / (rounds * abreast))
+        return Stretch(self.first_step, self.first_uid, abreast * brood, 1.0, length, brood)

@@ -180,9 +180,11 @@ class MapElites:
         weights = self._selection.weights(occupied, self._archive.uids(occupied))
         rng = keyed(self._config.seed, Purpose.SELECTION, step)
         drawn = draw_parents(weights, len(occupied), batch, rng)
+        # Drawn for every child, so that a lineage begins at an elite that its first birth had drawn,
+        # and a brood at the one that the first of its births had.
+        drawn = drawn[self._stretch.drawing(step)]
         distinct, parent = np.unique(drawn, return_inverse=True)
         elites = self._archive.elites(occupied[distinct])
-        # Drawn for every child, so that a lineage begins at an elite that its first birth had drawn.
         slot, goes_on = self._stretch.slots(step)
         latest = np.where(goes_on, self._lineages.rows(slot), NONE)
         unselected = latest != NONE

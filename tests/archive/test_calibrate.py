@@ -6,6 +6,7 @@ import shutil
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -20,7 +21,7 @@ from nichechain.domains.base import Domain
 from nichechain.execution import Threads
 from nichechain.verification import verify
 
-from .folder.samples import content
+from .folder.samples import content, edited, written
 
 # The last step is cut, so children are pending that will never be born.
 CONFIG = nc.BuildConfig(
@@ -47,11 +48,11 @@ def pristine(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return built(tmp_path_factory.mktemp("pristine") / "archive")
 
 
-def calibrated(pristine: Path, folder: Path, *rollouts: int, workers: int = 1) -> Path:
+def calibrated(pristine: Path, folder: Path, *rollouts: int, workers: int = 1, brood: int = 10) -> Path:
     shutil.copytree(pristine, folder)
     with Threads(workers) as executor:
         for number in rollouts:
-            nc.calibrate(folder, number, executor)
+            nc.calibrate(folder, number, executor, brood=brood)
     return folder
 
 
@@ -72,12 +73,17 @@ def test_births_are_added_and_none_is_changed(pristine: Path, more: Path) -> Non
 def test_all_are_of_lineages_that_begin_at_elites(more: Path) -> None:
     births = nc.load(more).births()
     new = births[450:]
-    # 167 lineages, 56 of them side by side, for 6 steps each: 17 whole steps and 48 births.
+    # 167 lineages are 17 broods, six of them side by side, for 6 steps each: 16 whole steps and 40 births.
     generation = (new["step"] - new["step"].min()) % 6
-    assert new.groupby("step").size().tolist() == [56] * 17 + [48]
+    assert new.groupby("step").size().tolist() == [60] * 16 + [40]
     pd.testing.assert_series_equal(new["lineage"], generation > 0, check_names=False, check_dtype=False)
     following = new[new["lineage"]]
-    assert (following["parent_uid"] == following["uid"] - 56).all()
+    assert (following["parent_uid"] == following["uid"] - 60).all()
+    first = new[~new["lineage"]]
+    brood = (first["uid"] - 450) // 10
+    assert (first.groupby(brood)["parent_uid"].nunique() == 1).all()
+    # Elites are drawn with replacement: 18 of some fifty.
+    assert first.groupby(brood)["parent_uid"].first().nunique() > 10
     elites: dict[int, int] = {}
     for step, rows in births.groupby("step"):
         if step >= new["step"].min():
@@ -92,7 +98,8 @@ def test_all_are_of_lineages_that_begin_at_elites(more: Path) -> None:
 
 def test_births_go_where_lineages_stand(pristine: Path, tmp_path: Path) -> None:
     """Their parents are in niches as those of lineages are that start at elites drawn alike."""
-    archive = nc.load(calibrated(pristine, tmp_path / "archive", 6 * 64 * 20))
+    # Of lineages that begin at the same elite there are fewer roots to compare.
+    archive = nc.load(calibrated(pristine, tmp_path / "archive", 6 * 64 * 20, brood=1))
     states = archive.niches.states
     new = archive.births()[450:]
     found = np.bincount(new["parent_niche"][new["lineage"]], minlength=states)
@@ -147,6 +154,44 @@ class Stopping:
         return found
 
 
+def test_the_brood_is_remembered(pristine: Path, tmp_path: Path) -> None:
+    folder = calibrated(pristine, tmp_path / "archive", 60, brood=5)
+    with pytest.raises(KeyboardInterrupt):
+        nc.calibrate(folder, 72, Stopping(4, after=False), brood=4)
+    with Threads(1) as executor:
+        nc.calibrate(folder, executor=executor, resume=True)
+        nc.calibrate(folder, 24, executor)
+        archive = nc.load(folder)
+        assert [each.brood for each in archive.meta.calibrations] == [5, 4, 10]
+        assert verify(archive, sample=20, executor=executor).mismatched == ()
+    new = archive.births()[450:]
+    begun = new[~new["lineage"]]
+    # Ten lineages are two broods of five, twelve three of four, and four one of four.
+    assert begun.groupby(["step", "parent_uid"], sort=False).size().tolist() == [5, 5, 4, 4, 4, 4]
+
+
+def test_a_calibration_of_before_there_were_broods_goes_on_as_it_was(pristine: Path, tmp_path: Path) -> None:
+    """Metadata of then have no brood, in the configuration or in the calibration."""
+    alone = calibrated(pristine, tmp_path / "alone", 300, brood=1)
+    folder = tmp_path / "archive"
+    shutil.copytree(pristine, folder)
+    with pytest.raises(KeyboardInterrupt):
+        nc.calibrate(folder, 300, Stopping(3, after=False), brood=1)
+
+    def of_then(meta: dict[str, Any]) -> None:
+        del meta["calibrations"][0]["brood"]
+
+    written(folder, edited(content(folder), of_then))
+    assert nc.load(folder).meta.calibrations[0].brood == 1
+    with Threads(1) as executor:
+        assert verify(folder, sample=20, executor=executor).ok
+        nc.calibrate(folder, executor=executor, resume=True)
+    assert content(folder) == content(alone)
+    written(folder, edited(content(folder), of_then))
+    with Threads(1) as executor:
+        assert verify(folder, sample=20, executor=executor).mismatched == ()
+
+
 @pytest.mark.parametrize("call", [1, 2, 7, 16])
 @pytest.mark.parametrize("after", [False, True])
 def test_an_interrupted_one_goes_on_to_the_same_bits(
@@ -157,7 +202,7 @@ def test_an_interrupted_one_goes_on_to_the_same_bits(
     with pytest.raises(KeyboardInterrupt):
         nc.calibrate(folder, 1000, Stopping(call, after))
     kept = nc.load(folder).meta
-    assert kept.births == 450 + 56 * (call - 1)
+    assert kept.births == 450 + 60 * (call - 1)
     with Threads(1) as executor:
         if call == 1:
             # There was nothing to keep, so the archive is as it was.
@@ -165,7 +210,7 @@ def test_an_interrupted_one_goes_on_to_the_same_bits(
             nc.calibrate(folder, 1000, executor)
         else:
             assert verify(folder, sample=5, executor=executor).ok
-            with pytest.raises(ArchiveError, match=f"lacks {1000 - 56 * (call - 1)} of its 1000 births"):
+            with pytest.raises(ArchiveError, match=f"lacks {1000 - 60 * (call - 1)} of its 1000 births"):
                 nc.calibrate(folder, 7, executor)
             nc.calibrate(folder, executor=executor, resume=True)
         with pytest.raises(ArchiveError, match="no calibration to go on with"):

@@ -84,6 +84,7 @@ TABLE: tuple[tuple[str, str, tuple[str, ...], Bad], ...] = (
             "selection_lineages": _COUNT,
             "lineage_share": ("1", *_SHARE),
             "lineage_length": ("1", *_COUNT),
+            "lineage_brood": _COUNT,
             "replacement": _UNKNOWN,
             "outside": _UNKNOWN,
             "seed": _NATURAL,
@@ -107,6 +108,7 @@ TABLE: tuple[tuple[str, str, tuple[str, ...], Bad], ...] = (
         {
             "path": (*_PATH, "{imported}", "{merged}", "{unfinished}"),
             "rollouts": _COUNT,
+            "brood": _COUNT,
             "workers": _WORKERS,
             "cache_memory": _MEMORY,
             "max_failed": _SHARE,

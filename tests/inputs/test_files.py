@@ -92,6 +92,7 @@ CALLS = (
             "selection_lineages": whole(0),
             "lineage_share": (1.0, *SHARE),
             "lineage_length": whole(1),
+            "lineage_brood": whole(0),
         },
     ),
     Call(
@@ -147,6 +148,7 @@ CALLS = (
                 Made(lambda w: w.unfinished, "unfinished"),
             ),
             "rollouts": (None, *whole(0)),
+            "brood": whole(0),
             "max_failed": SHARE,
         },
     ),

@@ -37,7 +37,10 @@ def test_there_and_back_through_json(config: BuildConfig) -> None:
 
 
 def test_json_names_every_field() -> None:
-    assert set(ARM.to_json()) == {field.name for field in dataclasses.fields(BuildConfig)}
+    names = {field.name for field in dataclasses.fields(BuildConfig)}
+    # The usual epsilon is left out, as before there was one.
+    assert set(ARM.to_json()) == names - {"epsilon"}
+    assert set(dataclasses.replace(ARM, epsilon=1e-3).to_json()) == names
 
 
 @pytest.mark.parametrize(
@@ -50,6 +53,7 @@ def test_json_names_every_field() -> None:
         ({"seed": -1}, "seed is -1, but must not be negative"),
         ({"lineage_share": 1.0}, "lineage_share is 1, but must be a share of births, from 0 to below 1"),
         ({"lineage_length": 1}, "lineage_length is 1, but must be at least 2"),
+        ({"lineage_brood": 0}, "lineage_brood is 0, but must be at least 1"),
         ({"domain_seed": -1}, "domain_seed is -1, but must not be negative"),
         (
             {"replacement": "best"},
@@ -79,8 +83,14 @@ def test_a_value_that_an_earlier_version_did_not_know_is_its_default() -> None:
 
 def test_a_build_of_before_there_were_lineages_has_none() -> None:
     values = ARM.to_json()
-    del values["lineage_share"], values["lineage_length"]
-    assert BuildConfig.from_json(values) == dataclasses.replace(ARM, lineage_share=0.0)
+    del values["lineage_share"], values["lineage_length"], values["lineage_brood"]
+    assert BuildConfig.from_json(values) == dataclasses.replace(ARM, lineage_share=0.0, lineage_brood=1)
+
+
+def test_lineages_of_a_build_of_before_there_were_broods_begin_alone() -> None:
+    values = ARM.to_json()
+    del values["lineage_brood"]
+    assert BuildConfig.from_json(values) == dataclasses.replace(ARM, lineage_brood=1)
 
 
 def test_is_immutable() -> None:

@@ -31,6 +31,7 @@ CONFIG = BuildConfig(
     seed=11,
     lineage_share=0.2,
     lineage_length=5,
+    lineage_brood=1,
 )
 
 
@@ -137,7 +138,7 @@ def test_the_share_takes_no_birth_from_selection_that_it_does_not_use(tmp_path: 
 @pytest.mark.parametrize("share", [0.001, 0.01, 0.05, 0.07, 0.5, 0.999, 1.0])
 @pytest.mark.parametrize("batch", [1, 7, 64, 100])
 def test_slots_take_turns(share: float, batch: int) -> None:
-    stretch = Stretch(3, 500, batch, share, 4)
+    stretch = Stretch(3, 500, batch, share, 4, 1)
     given: list[int] = []
     begun = Counter[int]()
     for step in range(3, 403):
@@ -173,7 +174,7 @@ def test_lineages_are_found_and_replaced_by_slot() -> None:
     ("asked", "slots"), [(1, 1), (9, 2), (5, 1), (6, 2), (235, 47), (236, 24), (9999, 47)]
 )
 def test_a_calibration_runs_whole_lineages_side_by_side(asked: int, slots: int) -> None:
-    stretch = Calibration(7, 100, asked).stretch(CONFIG)
+    stretch = Calibration(7, 100, asked, 1).stretch(CONFIG)
     assert (stretch.batch, stretch.uid(7), stretch.uid(8)) == (slots, 100, 100 + slots)
     slot, goes_on = stretch.slots(7)
     assert slot.tolist() == list(range(slots))

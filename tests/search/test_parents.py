@@ -29,6 +29,7 @@ CONFIG = BuildConfig(
     scale=0.3,
     seed=5,
     selection="curiosity",
+    lineage_brood=1,
 )
 
 

@@ -22,7 +22,15 @@ from nichechain.search.elites import SearchState
 
 # 333 births end in the middle of a step, so children are pending.
 CONFIG = BuildConfig(
-    "arm", (6, 5), ((-0.7, 1.0), (-0.9, 0.8)), evaluations=333, initial=50, batch=32, scale=0.3, seed=5
+    "arm",
+    (6, 5),
+    ((-0.7, 1.0), (-0.9, 0.8)),
+    evaluations=333,
+    initial=50,
+    batch=32,
+    scale=0.3,
+    seed=5,
+    lineage_brood=2,
 )
 
 

@@ -162,6 +162,19 @@ def _other_parent(forgery: Forgery) -> int:
     raise AssertionError
 
 
+def _other_parent_in_a_brood(forgery: Forgery) -> int:
+    """One of the first births of a brood becomes the child of an elite of its own."""
+    births = forgery.births
+    flagged = births[births["lineage"].astype(bool)]
+    begun = sorted(uid for uid in flagged["parent_uid"] if not births.loc[uid, "lineage"])
+    for uid in begun:
+        if births.loc[uid, "parent_uid"] == births.loc[uid - 1, "parent_uid"]:
+            other = births.loc[uid - 12]
+            forgery.set(uid, **{name: other[name] for name in ("parent_uid", "parent_niche", "depth")})
+            return int(uid)
+    raise AssertionError
+
+
 def _becomes_failed(forgery: Forgery) -> int:
     uid = _fine(forgery)
     nothing = dict.fromkeys(("behavior_0", "behavior_1", "objective", "child_niche"))
@@ -293,6 +306,7 @@ def _flag(lineage: bool) -> Callable[[Forgery], int]:
         (_alter("objective", _nudged), "births have the recorded objective"),
         (_alter("accepted", lambda kept: not kept), "births are accepted that have the largest key so far"),
         (_other_parent, "parents are those that the seed draws"),
+        (_other_parent_in_a_brood, "parents are those that the seed draws"),
         (_becomes_failed, "births fail or not, for the recorded reason"),
         (_becomes_fine, "births fail or not, for the recorded reason"),
         (_other_reason, "births fail or not, for the recorded reason"),

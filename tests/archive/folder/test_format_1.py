@@ -30,6 +30,7 @@ def test_its_numbers_are_those_of_then() -> None:
         scale=0.3,
         seed=5,
         lineage_share=0.0,
+        lineage_brood=1,
     )
     assert not archive.births()["lineage"].any()
     assert archive.meta.complete
