@@ -45,7 +45,7 @@ def write_graphml(graph: nx.DiGraph, path: str | Path) -> None:
     import networkx as nx
 
     buffer = io.BytesIO()
-    nx.write_graphml(_flat(graph), buffer, named_key_ids=True)
+    nx.write_graphml(graph, buffer, named_key_ids=True)
     replace_file(path, buffer.getvalue())
 
 
@@ -56,7 +56,7 @@ def write_gexf(graph: nx.DiGraph, path: str | Path) -> None:
     """
     import networkx as nx
 
-    flat = _flat(graph)
+    flat = graph.copy()
     for _, node in flat.nodes(data=True):
         if "x" in node:
             node["viz"] = {"position": {"x": node["x"], "y": node.get("y", 0.0), "z": node.get("z", 0.0)}}
@@ -73,7 +73,7 @@ def write_dot(graph: nx.DiGraph, path: str | Path) -> None:
     Positions are scaled to ten inches, for ``neato -n`` to draw the niches where they are. Other
     parameters and errors are those of :func:`write_graphml`.
     """
-    flat = _flat(graph)
+    flat = graph.copy()
     places = [(node["x"], node.get("y", 0.0)) for _, node in flat.nodes(data=True) if "x" in node]
     span = float(np.ptp(places, axis=0).max()) if places else 0.0
     for _, node in flat.nodes(data=True):
@@ -93,7 +93,7 @@ def write_edges(graph: nx.DiGraph, path: str | Path) -> None:
     """
     edges = [{"source": i, "target": j, **edge} for i, j, edge in graph.edges(data=True)]
     names = ["source", "target", "probability", "count", "distance", "long_jump"]
-    replace_file(path, _csv(names, ([edge.get(name, "") for name in names] for edge in edges)))
+    replace_file(path, _csv(names, ([_cell(edge[name]) for name in names] for edge in edges)))
 
 
 def write_stn(births: pd.DataFrame, niches: Niches, path: str | Path) -> None:
@@ -231,15 +231,6 @@ def write_genealogy(births: pd.DataFrame, path: str | Path) -> None:
     replace_file(path, _csv(["child", "parent"], pairs))
 
 
-def _flat(graph: nx.DiGraph) -> nx.DiGraph:
-    """A copy whose positions are plain numbers, which is all that file formats know."""
-    flat = graph.copy()
-    for _, node in flat.nodes(data=True):
-        axes = node.pop("position", ())
-        node.update({"xyz"[k] if k < 3 else f"x{k}": float(x) for k, x in enumerate(axes)})
-    return flat
-
-
 def _dot_attributes(attributes: dict[str, Any]) -> str:
     return "[" + ", ".join(f"{name}={_dot_value(value)}" for name, value in attributes.items()) + "]"
 
@@ -260,6 +251,11 @@ def _numbered(births: pd.DataFrame) -> tuple[list[int], list[int | None]]:
     parent_rows(run, uid, parent_uid)
     number, parents = across_runs(run, uid, parent_uid)
     return number.tolist(), [None if parent == NONE else parent for parent in parents.tolist()]
+
+
+def _cell(value: Any) -> Any:
+    """A value of a table; what there is not is empty."""
+    return "" if isinstance(value, float) and np.isnan(value) else value
 
 
 def _csv(names: Sequence[str], rows: Iterable[Sequence[Any]], separator: str = ",") -> bytes:

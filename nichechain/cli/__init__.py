@@ -24,6 +24,7 @@ COMMANDS = {
     "merge": "archives of one domain, niches and mutation as one",
     "import": "births of another program's search, from CSV or Parquet",
     "plot": "heat maps of an archive and graphs of which niches lead to which",
+    "watch": "what the elite of a niche does, as a film or a picture",
     "explore": "a page on which one clicks a niche and sees where its descendants go",
     "sweep": "how many niches the births of an archive fill: too few, too many, and a suggestion",
     "validate": "whether the chain is one, and whether its predictions come true",

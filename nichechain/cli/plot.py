@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 
 _WITH_THRESHOLD = ("reachability", "classes", "transitions-by-class")
 
+_MAPS = ("elites", "visits", "evolvability", "uncertainty", "reach", "reachability", "wormholes", "classes")
+
 # Figures of two pictures, and their sizes in inches.
 _PAIRS = {"uncertainty": (14.0, 7.4), "growth": (12.0, 5.6)}
 _FEW_DRAWS = 5
@@ -86,6 +88,13 @@ def run(arguments: Sequence[str]) -> int:
     if command.niche is not None and command.kind not in ("reach", "growth"):
         raise NichechainError(f"--niche belongs to reach and growth, not to {command.kind}")
     archive = load(command.path)
+    axes = len(archive.niches.bounds)
+    if command.kind in _MAPS and axes > 2:
+        # Before anything is computed for a map that cannot be drawn.
+        raise NichechainError(
+            f"behavior has {axes} axes, but {command.kind} is drawn over 1 or 2: "
+            "growth, transitions and transitions-by-class are drawn of any number"
+        )
     pair = command.kind in _PAIRS
     figure = output.new_figure(*(_PAIRS[command.kind] if pair else (7.0, 7.4)))
     if pair:
@@ -104,6 +113,10 @@ def _draw_pair(command: PlotCommand, archive: Archive, left: Axes, right: Axes) 
     from nichechain.evolvability import niche_evolvability
 
     chain = archive.chain(command.estimator)
+    if command.kind == "growth":
+        from nichechain.plots.growth import check_growth
+
+        check_growth(chain)
     if command.kind == "uncertainty":
         from nichechain.plots import plot_evolvability
         from nichechain.plots.maps import plot_uncertainty

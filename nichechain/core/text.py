@@ -26,3 +26,17 @@ def printable_values(values: Any) -> Any:
             return {printable(name): printable_values(value) for name, value in values.items()}
         case _:
             return values
+
+
+def some(number: int, one: str, more: str | None = None) -> str:
+    """A number of things: ``1 niche``, ``2 niches``.
+
+    Parameters
+    ----------
+    number : int
+    one : str
+        What one of them is called.
+    more : str, optional
+        What several are called; by default with an s.
+    """
+    return f"{number} {one if number == 1 else more or f'{one}s'}"

@@ -10,6 +10,7 @@ from nichechain.domains.gym import GymDomain
 from nichechain.domains.noise import Noise, Noisy, Perturbable, WithSensitivity, noise_sensitivity
 from nichechain.domains.registry import make, names
 from nichechain.domains.toy import CosinusMap, LinearMap
+from nichechain.domains.watching import Film, Motion, Watchable, watch
 
 __all__ = [
     "CosinusMap",
@@ -20,14 +21,18 @@ __all__ = [
     "FetchPush",
     "FetchReach",
     "FetchSlide",
+    "Film",
     "GymDomain",
     "LinearMap",
+    "Motion",
     "Noise",
     "Noisy",
     "Perturbable",
     "PlanarArm",
+    "Watchable",
     "WithSensitivity",
     "make",
     "names",
     "noise_sensitivity",
+    "watch",
 ]

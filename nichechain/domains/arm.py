@@ -10,9 +10,13 @@ from numpy.typing import ArrayLike, NDArray
 from nichechain.core.checks import check_at_least, check_seed, rng_of
 from nichechain.domains.base import Evaluation, check_genotypes
 from nichechain.domains.noise import Noise, check_seeds
+from nichechain.domains.watching import Motion
 
 if TYPE_CHECKING:
     from torch import nn
+
+# A posture has no time of its own: it is reached within two seconds.
+_MOMENTS, _RATE = 40, 20.0
 
 
 class PlanarArm:
@@ -91,6 +95,15 @@ class PlanarArm:
         objective[failed] = np.nan
         reasons = tuple("genotype is not finite" if bad else "" for bad in failed)
         return Evaluation(hand, objective, failed, reasons)
+
+    def watch(self, genotype: ArrayLike, *, drawn: bool = True) -> Motion:  # noqa: ARG002
+        """The arm from stretched to the posture of a genotype (joints,), all joints turning at once."""
+        (angles,) = check_genotypes(np.asarray(genotype)[None], self.genotype_length).astype(np.float64)
+        turned = np.linspace(0.0, 1.0, _MOMENTS)[:, None] * angles
+        directions = np.cumsum(turned, axis=1)
+        links = np.stack([np.cos(directions), np.sin(directions)], axis=2) / self.genotype_length
+        joints = np.concatenate([np.zeros((_MOMENTS, 1, 2)), np.cumsum(links, axis=1)], axis=1)
+        return Motion({"hand": joints[:, -1]}, joints, _RATE)
 
     def controller(self, genotype: ArrayLike) -> nn.Module:  # noqa: ARG002
         """An arm has no controller.

@@ -15,6 +15,7 @@ from nichechain.domains.memory import CACHE_MEMORY, check_cache_memory
 from nichechain.domains.noise import Noise, check_seeds
 from nichechain.domains.policies.controllers import Controller
 from nichechain.domains.policies.networks import network
+from nichechain.domains.watching import Film, Motion, offscreen_backend
 
 if TYPE_CHECKING:
     from torch import nn
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
 
 
 _OUTPUTS = 4
+_RATE = 25.0
 
 
 class FetchTask:
@@ -184,6 +186,25 @@ class FetchTask:
         """What the policy of one genotype sees and does: 51 observations and 50 actions."""
         (row,) = check_genotypes(np.asarray(genotype)[None], self.genotype_length)
         return self._episodes.run(self.network, row, self.steps)
+
+    def watch(self, genotype: ArrayLike, *, drawn: bool = False) -> Film | Motion:
+        """The episode of one genotype: pictures, or places where MuJoCo has no renderer.
+
+        Parameters
+        ----------
+        genotype : (genotype_length,) array
+        drawn : bool
+            Whether to give the places of gripper and block over the table in any case.
+        """
+        episode = self.episode(genotype)
+        if not drawn and offscreen_backend() is not None:
+            from nichechain.domains.engine.pictures import fetch_pictures
+
+            return Film(fetch_pictures(self.env_id, self.seed, episode.actions), _RATE)
+        tracks = {"gripper": episode.observations[:, :2]}
+        if self.has_block:
+            tracks["block"] = episode.observations[:, self.place][:, :2]
+        return Motion(tracks, None, _RATE)
 
     def actions(self, genotype: ArrayLike, observations: ArrayLike) -> NDArray[np.float32]:
         """What the policy does for each of n observations: (n, 4) float32, in [-1, 1]."""

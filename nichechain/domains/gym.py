@@ -18,6 +18,7 @@ from nichechain.domains.noise import Noise, average, check_repeats, check_seeds,
 from nichechain.domains.policies.controllers import MLP, Controller
 from nichechain.domains.policies.networks import network
 from nichechain.domains.policies.spaces import Actions, Observations, actions_of, stacked
+from nichechain.domains.watching import Film
 from nichechain.niches import parse_bounds
 from nichechain.niches.base import check_bounds, precision_of
 
@@ -265,6 +266,26 @@ class GymDomain:
         (row,) = check_genotypes(np.asarray(genotype)[None], self.genotype_length)
         env = _make(self.env_id, self._steps, self._env_options)
         return self._episode(env, row, self.seed, _SILENCE, 0)
+
+    def watch(self, genotype: ArrayLike, *, drawn: bool = False) -> Film:
+        """Pictures of one genotype's episode, as the environment renders them.
+
+        Raises
+        ------
+        NichechainError
+            If the environment renders no pictures here, or a drawing is asked for.
+        """
+        if drawn:
+            raise NichechainError(f"{self.name} cannot be drawn: an environment shows itself by its renderer")
+        from nichechain.domains.filming import Filmed, makes_pictures
+
+        (row,) = check_genotypes(np.asarray(genotype)[None], self.genotype_length)
+        with makes_pictures(self.env_id, self._idle[0] if self._idle else None):
+            env = _make(self.env_id, self._steps, {**self._env_options, "render_mode": "rgb_array"})
+            camera = Filmed(env)
+            self._episode(camera, row, self.seed, _SILENCE, 0)
+            env.close()
+        return Film(np.stack(camera.frames), camera.rate)
 
     def controller(self, genotype: ArrayLike) -> nn.Module:
         """The policy as a torch module, from flat observations to outputs (see the notes)."""

@@ -1,6 +1,7 @@
 """Figures. Every ``plot_`` function draws on a matplotlib Axes and returns it."""
 
 from nichechain.plots.classes import plot_classes, plot_transitions_by_class
+from nichechain.plots.episode import plot_motion, watch_elite
 from nichechain.plots.explorer import write_explorer
 from nichechain.plots.graphs import plot_reachability, plot_wormholes
 from nichechain.plots.growth import plot_generations, plot_lineages
@@ -25,6 +26,7 @@ __all__ = [
     "plot_filling",
     "plot_generations",
     "plot_lineages",
+    "plot_motion",
     "plot_reach",
     "plot_reachability",
     "plot_reached",
@@ -38,5 +40,6 @@ __all__ = [
     "plot_visits",
     "plot_walks",
     "plot_wormholes",
+    "watch_elite",
     "write_explorer",
 ]

@@ -11,7 +11,7 @@ from scipy import sparse
 from nichechain.chain.structure.classes import communicating_classes, recurrent_classes
 from nichechain.core.errors import NichechainError
 from nichechain.plots.cells import cells_along, fill, hatch
-from nichechain.plots.style import EDGE, EMPTY, INK, LONG_JUMP, START, behavior_axes, colorbar, key
+from nichechain.plots.style import EDGE, EMPTY, INK, LONG_JUMP, START, axes_of, behavior_axes, colorbar, key
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -29,7 +29,9 @@ _SMALLEST = 1e-3
 _BORDER = 6.0
 
 
-def plot_classes(archive: Archive, chain: NicheChain, ax: Axes, *, threshold: float = 0.0) -> Axes:
+def plot_classes(
+    archive: Archive, chain: NicheChain, ax: Axes | None = None, *, threshold: float = 0.0
+) -> Axes:
     """Niches by communicating class; those that no lineage leaves are hatched.
 
     A posterior mean has no zeros and thus one class: hand over a chain of ``mle``, or a threshold.
@@ -39,7 +41,8 @@ def plot_classes(archive: Archive, chain: NicheChain, ax: Axes, *, threshold: fl
     ----------
     archive : Archive
     chain : NicheChain
-    ax : matplotlib.axes.Axes
+    ax : matplotlib.axes.Axes, optional
+        By default one of its own.
     threshold : float
         Transitions at or below this probability do not count.
 
@@ -52,6 +55,7 @@ def plot_classes(archive: Archive, chain: NicheChain, ax: Axes, *, threshold: fl
     NichechainError
         If the threshold is out of range or behavior does not have two axes.
     """
+    ax = axes_of(ax)
     from matplotlib.colors import ListedColormap, Normalize
     from matplotlib.patches import Patch
 
@@ -103,7 +107,7 @@ def plot_classes(archive: Archive, chain: NicheChain, ax: Axes, *, threshold: fl
 
 
 def plot_transitions_by_class(
-    archive: Archive, chain: NicheChain, ax: Axes, *, threshold: float = 0.0
+    archive: Archive, chain: NicheChain, ax: Axes | None = None, *, threshold: float = 0.0
 ) -> Axes:
     """T between the states that births speak of, the largest communicating class first.
 
@@ -123,6 +127,7 @@ def plot_transitions_by_class(
     NichechainError
         If no birth has a parent or the threshold is out of range.
     """
+    ax = axes_of(ax)
     from matplotlib.colors import LogNorm
 
     counts = archive.counts

@@ -12,11 +12,12 @@ from nichechain.chain.model import NicheChain
 from nichechain.core.checks import check_at_least
 from nichechain.core.errors import NichechainError
 from nichechain.core.intervals import drawn_interval
+from nichechain.core.text import some
 from nichechain.evolvability.averaging import ENDLESS, SATURATED
 from nichechain.evolvability.coverage import coverage_by_generation
 from nichechain.evolvability.question import Question, dense
 from nichechain.niches import Niche
-from nichechain.plots.style import EDGE, INK, LONG_JUMP, START
+from nichechain.plots.style import EDGE, INK, LONG_JUMP, START, axes_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -27,11 +28,12 @@ Ints = NDArray[np.int64]
 # Lines of up to four niches: told apart by lightness and by marker as well as by hue.
 _COLORS = (EDGE, LONG_JUMP, START, "#4a4a4a")
 _MARKERS = ("o", "s", "^", "D")
+_MOST_STATES = 4_000
 
 
 def plot_generations(
     chain: NicheChain,
-    ax: Axes,
+    ax: Axes | None = None,
     *,
     niches: Sequence[Niche],
     lineages: int = 100,
@@ -44,7 +46,8 @@ def plot_generations(
     Parameters
     ----------
     chain : NicheChain
-    ax : matplotlib.axes.Axes
+    ax : matplotlib.axes.Axes, optional
+        By default one of its own.
     niches : sequence of int or tuple of int
         One to four of them.
     lineages : int
@@ -63,18 +66,19 @@ def plot_generations(
     NichechainError
         If a niche does not exist, a number is out of range, or there are too many niches.
     """
+    ax = axes_of(ax)
     check_at_least(1, longest=longest)
     question = Question(longest, lineages, draws=draws, seed=seed)
     covered = _covered(chain, niches, question, np.array([lineages, ENDLESS]))
     _lines(ax, chain, niches, np.arange(1, longest + 1), covered[..., 0], covered[..., 1])
-    ax.set(xlabel="generations l", xlim=(0.5, longest + 0.5), title=f"Against l, {lineages} lineages")
+    ax.set(xlabel="generations l", xlim=(0.5, longest + 0.5), title=f"Against l, {some(lineages, 'lineage')}")
     ax.set_xticks(range(1, longest + 1, 1 + longest // 16))
     return ax
 
 
 def plot_lineages(
     chain: NicheChain,
-    ax: Axes,
+    ax: Axes | None = None,
     *,
     niches: Sequence[Niche],
     l: int = 5,
@@ -102,19 +106,36 @@ def plot_lineages(
     NichechainError
         As in :func:`plot_generations`.
     """
+    ax = axes_of(ax)
     question = Question(l, draws=draws, seed=seed)
     check_at_least(2, most=most)
     sizes = np.unique(np.round(np.geomspace(1, most, 17)).astype(np.int64))
     covered = _covered(chain, niches, question, np.append(sizes, ENDLESS))[:, :, -1]
     _lines(ax, chain, niches, sizes, covered[..., :-1], covered[..., -1:])
-    ax.set(xscale="log", xlabel="lineages U", title=f"Against U, {l} generations")
+    ax.set(xscale="log", xlabel="lineages U", title=f"Against U, {some(l, 'generation')}")
     return ax
+
+
+def check_growth(chain: NicheChain) -> None:
+    """Refuse chains whose curves would take too long, before anything is computed.
+
+    Raises
+    ------
+    NichechainError
+        If there are more than 4,000 states.
+    """
+    if chain.states > _MOST_STATES:
+        raise NichechainError(
+            f"the chain has {chain.states} states, but growth is computed in closed form, "
+            f"for at most {_MOST_STATES}"
+        )
 
 
 def _covered(chain: NicheChain, niches: Sequence[Niche], question: Question, lineages: Ints) -> Floats:
     """Coverage (draws, niches, generations, lineages)."""
     if not 1 <= len(niches) <= len(_COLORS):
         raise NichechainError(f"{len(niches)} niches are given, but one to {len(_COLORS)} can be told apart")
+    check_growth(chain)
     roots = [chain.state(niche) for niche in niches]
     return np.array(
         [

@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 
 from nichechain.core.checks import check_whole
 from nichechain.core.errors import NichechainError
+from nichechain.core.text import some
 from nichechain.plots.cells import fill, frame, hatch
-from nichechain.plots.style import EMPTY, INK, behavior_axes, colorbar, key, on_map
+from nichechain.plots.style import EMPTY, INK, axes_of, behavior_axes, colorbar, key, on_map
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -23,18 +24,20 @@ if TYPE_CHECKING:
     from nichechain.niches import Niche
 
 
-def plot_elites(archive: Archive, ax: Axes) -> Axes:
+def plot_elites(archive: Archive, ax: Axes | None = None) -> Axes:
     """Objective of the elite of every niche, and where each elite really ends.
 
     Parameters
     ----------
     archive : Archive
-    ax : matplotlib.axes.Axes
+    ax : matplotlib.axes.Axes, optional
+        By default one of its own.
 
     Returns
     -------
     matplotlib.axes.Axes
     """
+    ax = axes_of(ax)
     from matplotlib.lines import Line2D
 
     elites = archive.elites
@@ -50,18 +53,20 @@ def plot_elites(archive: Archive, ax: Axes) -> Axes:
     return ax
 
 
-def plot_visits(archive: Archive, ax: Axes) -> Axes:
+def plot_visits(archive: Archive, ax: Axes | None = None) -> Axes:
     """Births in every niche, on a logarithmic scale.
 
     Parameters
     ----------
     archive : Archive
-    ax : matplotlib.axes.Axes
+    ax : matplotlib.axes.Axes, optional
+        By default one of its own.
 
     Returns
     -------
     matplotlib.axes.Axes
     """
+    ax = axes_of(ax)
     from matplotlib.colors import LogNorm
 
     visits = archive.counts.visits[: len(archive.niches)].astype(float)
@@ -70,19 +75,22 @@ def plot_visits(archive: Archive, ax: Axes) -> Axes:
     mesh = _map(ax, archive, visits, "viridis", LogNorm(1.0, max(2.0, largest)))
     colorbar(ax, mesh, "births")
     births, outside = archive.meta.births, archive.counts.births_outside
-    ax.set_title(f"Births: {births}, {outside / births:.0%} outside")
+    ax.set_title(f"{some(births, 'birth')}, {outside / births:.0%} outside")
     key(ax)
     return ax
 
 
-def plot_evolvability(archive: Archive, scores: NicheEvolvability, ax: Axes, *, min_births: int = 20) -> Axes:
+def plot_evolvability(
+    archive: Archive, scores: NicheEvolvability, ax: Axes | None = None, *, min_births: int = 20
+) -> Axes:
     """l-evolvability of every niche that was a parent.
 
     Parameters
     ----------
     archive : Archive
     scores : NicheEvolvability
-    ax : matplotlib.axes.Axes
+    ax : matplotlib.axes.Axes, optional
+        By default one of its own.
     min_births : int
         Niches with fewer births behind their row of T are crossed out: their value is mostly
         the prior's.
@@ -91,6 +99,7 @@ def plot_evolvability(archive: Archive, scores: NicheEvolvability, ax: Axes, *, 
     -------
     matplotlib.axes.Axes
     """
+    ax = axes_of(ax)
     check_whole(min_births=min_births)
     from matplotlib.patches import Patch
 
@@ -98,8 +107,8 @@ def plot_evolvability(archive: Archive, scores: NicheEvolvability, ax: Axes, *, 
     values = np.where(births > 0, scores.value, np.nan)
     mesh = _map(ax, archive, values, "magma")
     hatch(ax, archive.niches, (births > 0) & (births < min_births), "#ffffff80")
-    colorbar(ax, mesh, f"niches reached in {scores.l} generations")
-    ax.set_title(f"{scores.l}-evolvability, {scores.lineages} lineages")
+    colorbar(ax, mesh, f"niches reached in {some(scores.l, 'generation')}")
+    ax.set_title(f"{scores.l}-evolvability, {some(scores.lineages, 'lineage')}")
     hatched = Patch(facecolor="#888888", hatch="////", edgecolor="white", label=f"under {min_births} births")
     key(ax, hatched, note=f"{scores.estimator}; convention: {scores.convention}; {scores.method}")
     return ax
@@ -118,7 +127,7 @@ def _map(
     return fill(ax, archive.niches, values, colors, norm)
 
 
-def plot_uncertainty(archive: Archive, scores: NicheEvolvability, ax: Axes) -> Axes:
+def plot_uncertainty(archive: Archive, scores: NicheEvolvability, ax: Axes | None = None) -> Axes:
     """Width of the 90 % interval of every niche that was a parent; stands beside the values.
 
     Parameters
@@ -126,7 +135,8 @@ def plot_uncertainty(archive: Archive, scores: NicheEvolvability, ax: Axes) -> A
     archive : Archive
     scores : NicheEvolvability
         As for :func:`nichechain.plots.plot_evolvability`.
-    ax : matplotlib.axes.Axes
+    ax : matplotlib.axes.Axes, optional
+        By default one of its own.
 
     Returns
     -------
@@ -137,6 +147,7 @@ def plot_uncertainty(archive: Archive, scores: NicheEvolvability, ax: Axes) -> A
     NichechainError
         If T is given, so that there is no interval, or behavior does not have two axes.
     """
+    ax = axes_of(ax)
     width = scores.high - scores.low
     if not width.any():
         raise NichechainError(f"T is given by {scores.estimator}, which leaves no interval to draw")
@@ -146,12 +157,14 @@ def plot_uncertainty(archive: Archive, scores: NicheEvolvability, ax: Axes) -> A
     shown = np.where(births > 0, width, np.nan)
     mesh = fill(ax, archive.niches, shown, "cividis")
     colorbar(ax, mesh, "width of the 90 % interval (niches)")
-    ax.set_title(f"Uncertainty: {np.median(width[births > 0]):.1f} niches in the middle")
+    ax.set_title(
+        f"Uncertainty: half of the intervals are under {np.median(width[births > 0]):.1f} niches wide"
+    )
     key(ax, note=f"{scores.estimator}; grey: never a parent")
     return ax
 
 
-def plot_reach(archive: Archive, reach: Reach, ax: Axes, *, niche: Niche | None = None) -> Axes:
+def plot_reach(archive: Archive, reach: Reach, ax: Axes | None = None, *, niche: Niche | None = None) -> Axes:
     """Probability that at least one of U lineages visits each niche.
 
     Colours follow the square root of the probability, so that rare niches are seen.
@@ -161,7 +174,8 @@ def plot_reach(archive: Archive, reach: Reach, ax: Axes, *, niche: Niche | None 
     archive : Archive
     reach : Reach
         From :func:`nichechain.evolvability.reach.reach`.
-    ax : matplotlib.axes.Axes
+    ax : matplotlib.axes.Axes, optional
+        By default one of its own.
     niche : int or tuple of int, optional
         Where the root stands, to frame it.
 
@@ -174,6 +188,7 @@ def plot_reach(archive: Archive, reach: Reach, ax: Axes, *, niche: Niche | None 
     NichechainError
         If there is no such niche, or behavior does not have two axes.
     """
+    ax = axes_of(ax)
     from matplotlib.colors import PowerNorm
     from matplotlib.patches import Patch
 
@@ -189,8 +204,7 @@ def plot_reach(archive: Archive, reach: Reach, ax: Axes, *, niche: Niche | None 
         frame(ax, archive.niches, state)
         whose = f" from niche {archive.niches.label(state)}"
         handles.append(Patch(fill=False, edgecolor=INK, linewidth=2.0, label="the root's niche"))
-    generations = "1 generation" if reach.l == 1 else f"{reach.l} generations"
-    ax.set_title(f"Reach{whose} in {generations}: {reach.evolvability:.1f} niches")
-    births = "" if reach.births is None else f"; {reach.births} births behind the row"
+    ax.set_title(f"Reach{whose} in {some(reach.l, 'generation')}: {reach.evolvability:.1f} niches")
+    births = "" if reach.births is None else f"; {some(reach.births, 'birth')} behind the row"
     key(ax, *handles, note=f"{reach.estimator}; convention: {reach.convention}{births}")
     return ax

@@ -10,7 +10,7 @@ from scipy import sparse
 from nichechain.core.errors import NichechainError
 from nichechain.niches import GridNiches
 from nichechain.plots.cells import cells_along
-from nichechain.plots.style import EMPTY, INK, colorbar, plain
+from nichechain.plots.style import EMPTY, INK, axes_of, colorbar, plain
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 _SMALLEST = 1e-3
 
 
-def plot_transitions(archive: Archive, chain: NicheChain, ax: Axes) -> Axes:
+def plot_transitions(archive: Archive, chain: NicheChain, ax: Axes | None = None) -> Axes:
     """T between the states that births speak of, in the order of the grid or of the first axis.
 
     The outside state comes last.
@@ -32,7 +32,8 @@ def plot_transitions(archive: Archive, chain: NicheChain, ax: Axes) -> Axes:
     ----------
     archive : Archive
     chain : NicheChain
-    ax : matplotlib.axes.Axes
+    ax : matplotlib.axes.Axes, optional
+        By default one of its own.
 
     Returns
     -------
@@ -43,6 +44,7 @@ def plot_transitions(archive: Archive, chain: NicheChain, ax: Axes) -> Axes:
     NichechainError
         If no birth has a parent.
     """
+    ax = axes_of(ax)
     from matplotlib.colors import LogNorm
 
     counts = archive.counts

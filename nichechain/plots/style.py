@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from nichechain.core.errors import NichechainError
+from nichechain.niches import GridNiches
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -28,12 +29,23 @@ FAINT = "#b9c0c7"
 START = "#e8a33d"
 """Where a block, or a hand, is if nothing is done."""
 INK = "#333333"
+_NAMES = "#777777"
 
 
 # Height of a strip that shows one axis of behavior, over its width.
 _STRIP = 0.18
 # Distance of the legend from the map, over the map's height.
 _LEGEND = 0.09
+
+
+def axes_of(ax: Axes | None) -> Axes:
+    """The Axes given, or one of a new figure, which notebooks show."""
+    if ax is not None:
+        return ax
+    import matplotlib.pyplot as plt
+
+    _, made = plt.subplots(layout="constrained")
+    return made
 
 
 def behavior_axes(ax: Axes, archive: Archive, *, strip: bool = True) -> None:
@@ -61,6 +73,7 @@ def behavior_axes(ax: Axes, archive: Archive, *, strip: bool = True) -> None:
     if len(names) == 2:
         (left, right), (bottom, top) = archive.niches.bounds
         ax.set(xlim=(left, right), ylim=(bottom, top), aspect="equal", xlabel=names[0], ylabel=names[1])
+        _name_niches(ax, archive)
     else:
         ax.set(xlim=archive.niches.bounds[0], ylim=(0.0, 1.0), yticks=[], xlabel=names[0])
         ax.set_box_aspect(_STRIP)
@@ -82,6 +95,23 @@ def behavior_axes(ax: Axes, archive: Archive, *, strip: bool = True) -> None:
         )
 
 
+def _name_niches(ax: Axes, archive: Archive) -> None:
+    """Along the other two sides, the numbers that name niches of a grid, such as 14,3."""
+    niches = archive.niches
+    if not isinstance(niches, GridNiches):
+        return
+    sides = (ax.secondary_xaxis("top"), ax.secondary_yaxis("right"))
+    for side, name, (low, high), cells in zip(sides, "ij", niches.bounds, niches.shape, strict=True):
+        each = max(1, -(-cells // 5))
+        kept = np.arange(0, cells, each)
+        axis = side.xaxis if name == "i" else side.yaxis
+        axis.set_ticks(low + (kept + 0.5) * (high - low) / cells, [str(k) for k in kept])
+        side.tick_params(length=0, pad=2, labelsize="x-small", labelcolor=_NAMES)
+        side.spines[:].set_visible(False)
+        axis.set_label_text(f"niche {name}", fontsize="x-small", color=_NAMES)
+        axis.labelpad = 1
+
+
 def plain(text: str) -> str:
     """A name whose dollars are dollars: between two of them matplotlib would read a formula."""
     return text.replace("$", r"\$")
@@ -97,7 +127,7 @@ def colorbar(ax: Axes, mappable: ScalarMappable, label: str) -> None:
     """A colour bar as high as the map."""
     figure = ax.get_figure()
     assert figure is not None
-    bar = figure.colorbar(mappable, cax=ax.inset_axes((1.03, 0.0, 0.045, 1.0)))
+    bar = figure.colorbar(mappable, cax=ax.inset_axes((1.11, 0.0, 0.045, 1.0)))
     bar.set_label(plain(label))
     bar.outline.set_visible(False)
 
@@ -117,4 +147,4 @@ def key(ax: Axes, *handles: Any, note: str | None = None) -> None:
         if note:
             # As the legend's title it moves with it, however many lines the legend has.
             legend.set_title(note)
-            legend.get_title().set(fontsize="x-small", color="#555555")
+            legend.get_title().set(fontsize="small", color="#555555")

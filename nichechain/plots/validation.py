@@ -8,7 +8,7 @@ import numpy as np
 
 from nichechain.core.checks import check_whole
 from nichechain.core.errors import NichechainError
-from nichechain.plots.style import EDGE, FAINT, INK, LONG_JUMP, START
+from nichechain.plots.style import EDGE, FAINT, INK, LONG_JUMP, START, axes_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -22,13 +22,14 @@ _COLORS = {"niche": EDGE, "genotype": LONG_JUMP}
 _MARKERS = {"niche": "o", "genotype": "D"}
 
 
-def plot_calibration(check: DirectCheck, ax: Axes, *, generation: int) -> Axes:
+def plot_calibration(check: DirectCheck, ax: Axes | None = None, *, generation: int) -> Axes:
     """Niches reached by each elite's lineages against the chain's prediction, with 90 % intervals.
 
     Parameters
     ----------
     check : DirectCheck
-    ax : matplotlib.axes.Axes
+    ax : matplotlib.axes.Axes, optional
+        By default one of its own.
     generation : int
         Niches reached up to this generation, between 1 and l.
 
@@ -41,6 +42,7 @@ def plot_calibration(check: DirectCheck, ax: Axes, *, generation: int) -> Axes:
     NichechainError
         If there is no such generation.
     """
+    ax = axes_of(ax)
     last = check.reached.shape[1]
     check_whole(generation=generation)
     if not 1 <= generation <= last:
@@ -81,18 +83,20 @@ def plot_calibration(check: DirectCheck, ax: Axes, *, generation: int) -> Axes:
     return ax
 
 
-def plot_reached(check: DirectCheck, ax: Axes) -> Axes:
+def plot_reached(check: DirectCheck, ax: Axes | None = None) -> Axes:
     """Niches reached over generations, predicted and real, as means over the elites.
 
     Parameters
     ----------
     check : DirectCheck
-    ax : matplotlib.axes.Axes
+    ax : matplotlib.axes.Axes, optional
+        By default one of its own.
 
     Returns
     -------
     matplotlib.axes.Axes
     """
+    ax = axes_of(ax)
     generations = np.arange(1, check.reached.shape[1] + 1)
     mean = check.reached.mean(axis=0)
     error = check.reached.std(axis=0, ddof=1) / np.sqrt(len(check.reached))
@@ -133,18 +137,20 @@ def _finish(ax: Axes) -> None:
     ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), frameon=False, fontsize="small")
 
 
-def plot_stability(stability: RankStability, ax: Axes) -> Axes:
+def plot_stability(stability: RankStability, ax: Axes | None = None) -> Axes:
     """Rank correlation of thinned births with all of them, and of halves with each other.
 
     Parameters
     ----------
     stability : RankStability
-    ax : matplotlib.axes.Axes
+    ax : matplotlib.axes.Axes, optional
+        By default one of its own.
 
     Returns
     -------
     matplotlib.axes.Axes
     """
+    ax = axes_of(ax)
     from nichechain.validation.stability import ENOUGH
 
     frame = stability.to_frame()
@@ -182,18 +188,20 @@ def plot_stability(stability: RankStability, ax: Axes) -> Axes:
     return ax
 
 
-def plot_level(course: LevelCourse, ax: Axes) -> Axes:
+def plot_level(course: LevelCourse, ax: Axes | None = None) -> Axes:
     """Mean l-evolvability by each part of the births alone, and by all up to its end, with 90 % intervals.
 
     Parameters
     ----------
     course : LevelCourse
-    ax : matplotlib.axes.Axes
+    ax : matplotlib.axes.Axes, optional
+        By default one of its own.
 
     Returns
     -------
     matplotlib.axes.Axes
     """
+    ax = axes_of(ax)
     for x, level, low, high, color, marker, label in (
         (
             course.grown - course.births / 2,
@@ -234,7 +242,7 @@ def plot_level(course: LevelCourse, ax: Axes) -> Axes:
 _GREEN = "#4f8a5b"
 
 
-def plot_filling(sweep: Sweep, ax: Axes) -> Axes:
+def plot_filling(sweep: Sweep, ax: Axes | None = None) -> Axes:
     """The paper's warning: too few niches and children stay, too many and few are visited.
 
     The suggested grid is marked, and the grid of the search itself.
@@ -242,12 +250,14 @@ def plot_filling(sweep: Sweep, ax: Axes) -> Axes:
     Parameters
     ----------
     sweep : Sweep
-    ax : matplotlib.axes.Axes
+    ax : matplotlib.axes.Axes, optional
+        By default one of its own.
 
     Returns
     -------
     matplotlib.axes.Axes
     """
+    ax = axes_of(ax)
     frame = sweep.to_frame()
     for name, color, marker, text in (
         ("staying", LONG_JUMP, "o", "children that stay in their niche"),
@@ -263,18 +273,20 @@ def plot_filling(sweep: Sweep, ax: Axes) -> Axes:
     return ax
 
 
-def plot_surprise(sweep: Sweep, ax: Axes) -> Axes:
+def plot_surprise(sweep: Sweep, ax: Axes | None = None) -> Axes:
     """Bits of surprise in a child's niche, and what its parent's niche tells of it.
 
     Parameters
     ----------
     sweep : Sweep
-    ax : matplotlib.axes.Axes
+    ax : matplotlib.axes.Axes, optional
+        By default one of its own.
 
     Returns
     -------
     matplotlib.axes.Axes
     """
+    ax = axes_of(ax)
     frame = sweep.to_frame()
     niches = frame["niches"]
     ax.plot(
@@ -296,18 +308,20 @@ def plot_surprise(sweep: Sweep, ax: Axes) -> Axes:
     return ax
 
 
-def plot_scores(sweep: Sweep, ax: Axes) -> Axes:
+def plot_scores(sweep: Sweep, ax: Axes | None = None) -> Axes:
     """l-evolvability of one behavior on every grid, with its 90 % interval.
 
     Parameters
     ----------
     sweep : Sweep
-    ax : matplotlib.axes.Axes
+    ax : matplotlib.axes.Axes, optional
+        By default one of its own.
 
     Returns
     -------
     matplotlib.axes.Axes
     """
+    ax = axes_of(ax)
     frame = sweep.to_frame()
     niches = frame["niches"]
     place = ", ".join(f"{x:.3g}" for x in sweep.behavior)

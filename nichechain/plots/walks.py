@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from nichechain.core.checks import check_choice
 from nichechain.core.errors import NichechainError
 from nichechain.core.intervals import mean_interval
-from nichechain.plots.style import FAINT, INK, plain
+from nichechain.plots.style import FAINT, INK, axes_of, plain
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -29,6 +29,8 @@ DRAWN: Mapping[str, str] = {
 # Okabe and Ito's colours in an order of which neighbours differ in lightness as well.
 _COLORS = ("#000000", "#e69f00", "#0072b2", "#56b4e9", "#d55e00", "#cc79a7", "#009e73")
 _MARKERS = ("o", "s", "^", "D", "v", "P", "X")
+# More bands than these lie on each other.
+_MOST_BANDS = 3
 _DASHES: tuple[Any, ...] = ("-", (0, (5, 1.5)), (0, (1.5, 1.2)), (0, (5, 1.5, 1.2, 1.5)))
 
 
@@ -71,20 +73,21 @@ def line_styles(conditions: Sequence[str], *, ordered: bool = False) -> dict[str
 
 def plot_walks(
     records: pd.DataFrame,
-    ax: Axes,
+    ax: Axes | None = None,
     *,
     measure: str = "expected_evolvability",
     conditions: Sequence[str] | None = None,
     ordered: bool = False,
     unit: str = "",
 ) -> Axes:
-    """Mean of a measure at each step, with the band of its 95 % t-interval over runs.
+    """Mean of a measure at each step, with its 95 % t-interval over runs: a band, or bars for over three.
 
     Parameters
     ----------
     records : DataFrame
         Of :func:`nichechain.studies.read_records`.
-    ax : matplotlib.axes.Axes
+    ax : matplotlib.axes.Axes, optional
+        By default one of its own.
     measure : str
         One of :data:`DRAWN`.
     conditions : sequence of str, optional
@@ -107,12 +110,22 @@ def plot_walks(
     -----
     Source: the paper's figures of both experiments. A condition with a single run has no band.
     """
+    ax = axes_of(ax)
     labels = _labels(records, measure, conditions)
     for place, (label, style) in enumerate(line_styles(labels, ordered=ordered).items()):
         table = _pivot(records, label, measure)
         mean, low, high = mean_interval(table.to_numpy(np.float64))
         steps = table.columns.to_numpy()
-        ax.fill_between(steps, low, high, color=style.color, alpha=0.13, linewidth=0)
+        if len(labels) <= _MOST_BANDS:
+            ax.fill_between(steps, low, high, color=style.color, alpha=0.13, linewidth=0)
+        else:
+            # Bands on each other are a blur: bars at some steps, each condition's beside the others'.
+            every = max(len(labels), len(steps) // 8)
+            at = slice(place, None, every)
+            error = np.maximum(np.stack([mean - low, high - mean])[:, at], 0.0)
+            ax.errorbar(
+                steps[at], mean[at], error, color=style.color, fmt="none", elinewidth=1.0, capsize=2.0
+            )
         ax.plot(
             steps,
             mean,
@@ -136,7 +149,7 @@ def plot_walks(
 
 def plot_runs(
     records: pd.DataFrame,
-    ax: Axes,
+    ax: Axes | None = None,
     *,
     step: int,
     measure: str = "expected_evolvability",
@@ -161,6 +174,7 @@ def plot_runs(
     NichechainError
         If there is no such measure, condition or step.
     """
+    ax = axes_of(ax)
     labels = _labels(records, measure, conditions)
     if step not in set(records["step"]):
         raise NichechainError(f"step is {step}, but the walks have steps 0 to {records['step'].max()}")

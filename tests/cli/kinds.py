@@ -150,6 +150,7 @@ QUESTIONS: dict[str, tuple[str, ...]] = {
     "verify": ("verify", "{archive}", "--sample", "4", "--workers", "1"),
     "merge": ("merge", "{archive}", "{other}", "--out", "{out}/merged"),
     "import": ("import", "{births}", "--grid", "5x5", "--bounds=-1,1,-1,1", "--out", "{out}/imported"),
+    "watch": ("watch", "{archive}", "--niche", "{niche}", "--out", "{out}/arm.png"),
     "explore": ("explore", "{archive}", *_QUICK, "--draws", "3", "--out", "{out}/explore.html"),
     "sweep": (
         *("sweep", "{archive}", *_QUICK, "--sizes", "2,3", "--draws", "3", "--min-births", "1"),

@@ -190,6 +190,12 @@ TABLE: tuple[tuple[str, str, tuple[str, ...], Bad], ...] = (
         {"workers": _WORKERS, "cache_memory": _MEMORY, "offspring": _NATURAL, "rank": ("elites",)},
     ),
     (
+        "watch",
+        "WatchCommand",
+        ("{archive}", "--niche", "{niche}", "--out", "{fresh}.png"),
+        {"path": _PATH, "niche": _NICHE, "out": ("file.txt", "/no/such/folder/file.png", "file")},
+    ),
+    (
         "explore",
         "ExploreCommand",
         ("{archive}", "--out", "{fresh}"),

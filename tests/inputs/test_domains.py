@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from nichechain.domains import PlanarArm
 from nichechain.variation import Bound
 from nichechain.variation.noise import CauchyNoise
 
@@ -80,6 +81,11 @@ CALLS = (
                 ),
             )
         },
+    ),
+    Call(
+        "domains.watch",
+        lambda w: {"domain": PlanarArm(joints=2), "genotype": [0.1, 0.2]},
+        {"genotype": ([], [0.1], [[0.1, 0.2]], [np.nan, 0.0])},
     ),
     Call("niches.GridNiches.of", lambda w: {"self": w.niches, "behavior": [[0, 0]]}, {"behavior": _BEHAVIOR}),
     Call("niches.GridNiches.flat", lambda w: {"self": w.niches, "niche": 0}, {"niche": _BAD_NICHE}),

@@ -97,6 +97,7 @@ OBJECTS = {
     "Lineages",
     "Matrix",
     "Metric",
+    "Motion",
     "Mutation",
     "MutationNoise",
     "NicheChain",
@@ -125,6 +126,8 @@ OBJECTS = {
 
 # Made by functions that check, and read by users.
 RESULTS = {
+    "Film",
+    "Motion",
     "BuildProgress",
     "Check",
     "Comparison",

@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from nichechain.domains import Motion
+
 from .table import (
     LINEAGES,
     NOT_A_NUMBER,
@@ -29,6 +31,10 @@ _WALKS = {"measure": UNKNOWN, "conditions": (["no-such-condition"],)}
 
 def _no_runs(w: World) -> Any:
     return w.records.iloc[:0]
+
+
+def _motion() -> Motion:
+    return Motion({"hand": np.zeros((3, 2))}, None, 10.0)
 
 
 _EMPTY = (Made(_no_runs, "no-runs"),)
@@ -53,7 +59,21 @@ CALLS = (
     Call(
         "plots.plot_reachability",
         lambda w: {"archive": w.archive, "chain": w.chain, "ax": w.axes()},
-        {"threshold": SHARE},
+        {"threshold": SHARE, "most": whole(0)},
+    ),
+    Call(
+        "plots.plot_motion",
+        lambda w: {"archive": w.archive, "motion": _motion(), "ax": w.axes()},
+        {"niche": (-1, 99, (9, 9), "0"), "upto": (-1, 99, 0.5)},
+    ),
+    Call(
+        "plots.watch_elite",
+        lambda w: {
+            "archive": w.archive,
+            "niche": int(w.archive.elites.niche[0]),
+            "out": f"{w.fresh()}.png",
+        },
+        {"niche": (-1, 99, (9, 9), "0"), "out": ("film.avi", "film")},
     ),
     *(
         Call(

@@ -158,11 +158,3 @@ def test_visits_over_a_tessellation_are_births(archives, ax):
     births = archive.births()["child_niche"].value_counts()
     shown = ax.collections[0].get_array().filled(0)
     np.testing.assert_array_equal(shown, [births.get(niche, 0) for niche in range(40)])
-
-
-def test_a_page_shows_grids_only(archives):
-    from nichechain.plots.explorer import explorer_page
-
-    archive = archives["cvt"]
-    with pytest.raises(NichechainError, match="tessellation, but the page shows a grid"):
-        explorer_page(archive, archive.chain())

@@ -5,7 +5,7 @@ from matplotlib.figure import Figure
 import nichechain as nc
 from nichechain import plots
 from nichechain.core.errors import NichechainError
-from nichechain.plots.style import FAINT, LONG_JUMP, behavior_axes, plain
+from nichechain.plots.style import LONG_JUMP, behavior_axes, plain
 
 
 @pytest.fixture(scope="module")
@@ -72,19 +72,42 @@ def test_transitions_shows_rows_with_births(archive, ax):
 
 def test_reachability_has_an_arrow_per_observed_transition(archive, ax):
     chain = archive.chain()
-    plots.plot_reachability(archive, chain, ax, threshold=0.05)
+    plots.plot_reachability(archive, chain, ax, threshold=0.05, most=10_000)
     dense = np.asarray(chain.T)
     counts = archive.counts.matrix.toarray()
     n = len(archive.niches)
     wanted = (dense >= 0.05) & (counts > 0)
     np.fill_diagonal(wanted, False)
-    assert len(ax.patches) == wanted[:n, :n].sum()
+    start = archive.niches.of([[1.0, 0.0]])[0]
+    # What returns to the start is ringed, and told in numbers.
+    falls = int(wanted[:n, start].sum())
+    assert len(ax.patches) == wanted[:n, :n].sum() - falls
+    assert f"{falls} niches lead there" in ax.get_legend().get_title().get_text()
     graph = chain.graph(0.05)
     far = [edge for edge in graph.edges if graph.edges[edge]["long_jump"] and graph.edges[edge]["count"]]
-    start = archive.niches.of([[1.0, 0.0]])[0]
     colors = [matplotlib_color(patch) for patch in ax.patches]
     assert colors.count(LONG_JUMP) == sum(child != start for _, child in far) > 0
-    assert colors.count(FAINT) == wanted[:n, start].sum()
+
+
+def test_reachability_draws_the_strongest_and_says_so(archive, ax):
+    chain = archive.chain()
+    plots.plot_reachability(archive, chain, ax, most=7)
+    assert len(ax.patches) == 7
+    start = archive.niches.of([[1.0, 0.0]])[0]
+    edges = [
+        data["probability"]
+        for i, j, data in chain.graph().edges(data=True)
+        if data["count"] and j != start and chain.outside not in (i, j)
+    ]
+    assert ax.get_title().startswith(f"Reachability: the 7 strongest of {len(edges)} transitions")
+
+
+def test_figures_make_an_axes_where_none_is_given(archive):
+    import matplotlib.pyplot as plt
+
+    drawn = plots.plot_visits(archive)
+    assert drawn.get_title().endswith("outside")
+    plt.close(drawn.figure)
 
 
 def matplotlib_color(patch):

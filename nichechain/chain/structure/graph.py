@@ -32,11 +32,12 @@ def reachability_graph(chain: NicheChain, threshold: float = 0.05) -> nx.DiGraph
     -------
     networkx.DiGraph
         Nodes are states, those that were visited or have an edge, with attributes ``label``,
-        ``position`` (centre of the niche, where there is a grid), ``visits`` (births there),
-        ``births`` (of parents there) and ``stay`` (probability of a child in the same niche).
-        Edges have ``probability``, ``count`` (births), ``distance`` (between centres, in units of
-        behavior) and ``long_jump``: at least a quarter of the grid's diagonal. Self-loops are the
-        attribute ``stay``, not edges.
+        ``x``, ``y``, ``z`` and then ``x3``, ``x4``, … (centre of the niche, where it has a place),
+        ``visits`` (births there), ``births`` (of parents there) and ``stay`` (probability of a child in
+        the same niche). All edges have ``probability``, ``count`` (births), ``distance`` (between
+        centres, in units of behavior; NaN where there are none) and ``long_jump``: whether that is at
+        least a quarter of the grid's diagonal. All are plain values, which networkx can write.
+        Self-loops are the attribute ``stay``, not edges.
 
     Raises
     ------
@@ -71,16 +72,34 @@ def reachability_graph(chain: NicheChain, threshold: float = 0.05) -> nx.DiGraph
             births=0 if chain.counts is None else int(chain.counts.births[state]),
         )
         if chain.niches is not None and state != chain.outside:
-            graph.nodes[int(state)]["position"] = tuple(float(x) for x in chain.niches.centers[state])
+            center = chain.niches.centers[state]
+            graph.nodes[int(state)].update({axis_name(k): float(x) for k, x in enumerate(center)})
+    far = np.inf
+    if chain.niches is not None:
+        far = LONG_JUMP * float(np.linalg.norm(chain.niches.upper - chain.niches.lower))
     for i, j, p in zip(parent.tolist(), child.tolist(), probability.tolist(), strict=True):
-        graph.add_edge(i, j, probability=p, count=0 if counts is None else int(counts[i, j]))
-        if "position" in graph.nodes[i] and "position" in graph.nodes[j]:
-            assert chain.niches is not None
-            span = np.linalg.norm(chain.niches.upper - chain.niches.lower)
-            gap = np.linalg.norm(np.subtract(graph.nodes[i]["position"], graph.nodes[j]["position"]))
-            graph.edges[i, j]["distance"] = float(gap)
-            graph.edges[i, j]["long_jump"] = bool(gap >= LONG_JUMP * span)
+        gap = _apart(chain, i, j)
+        graph.add_edge(
+            i,
+            j,
+            probability=p,
+            count=0 if counts is None else int(counts[i, j]),
+            distance=gap,
+            long_jump=bool(gap >= far),
+        )
     return graph
+
+
+def axis_name(axis: int) -> str:
+    """How a node's place along an axis of behavior is called: x, y, z, and x3 after these."""
+    return "xyz"[axis] if axis < 3 else f"x{axis}"
+
+
+def _apart(chain: NicheChain, i: int, j: int) -> float:
+    """Distance of two centres; NaN for the outside, which is nowhere, and without niches."""
+    if chain.niches is None or chain.outside in (i, j):
+        return float("nan")
+    return float(np.linalg.norm(chain.niches.centers[i] - chain.niches.centers[j]))
 
 
 def betweenness(chain: NicheChain, *, threshold: float = 0.01) -> Floats:

@@ -53,8 +53,12 @@ def test_lengths_of_edges():
     assert edges[0, 3]["distance"] == pytest.approx(6.0)
     assert edges[0, 3]["long_jump"] is True
     # The outside is nowhere, so nothing is far from it.
-    assert "distance" not in edges[1, 4]
-    assert "long_jump" not in edges[4, 0]
+    assert math.isnan(edges[1, 4]["distance"])
+    assert edges[4, 0]["long_jump"] is False
+    # Edges are alike, whatever they join.
+    assert {tuple(sorted(edge)) for edge in edges.values()} == {
+        ("count", "distance", "long_jump", "probability")
+    }
 
 
 @pytest.mark.parametrize(("cells", "far"), [(4, True), (5, False)])
@@ -67,8 +71,8 @@ def test_a_jump_of_just_a_quarter_of_the_diagonal_is_long(cells, far):
 def test_nodes_of_a_given_chain():
     graph = reachability_graph(_by_hand())
     assert sorted(graph) == [0, 1, 2, 3, 4]
-    assert graph.nodes[0] == {"label": "0,0", "stay": 0.7, "visits": 0, "births": 0, "position": (1.0, 0.5)}
-    assert graph.nodes[3]["position"] == pytest.approx((7.0, 0.5))
+    assert graph.nodes[0] == {"label": "0,0", "stay": 0.7, "visits": 0, "births": 0, "x": 1.0, "y": 0.5}
+    assert (graph.nodes[3]["x"], graph.nodes[3]["y"]) == pytest.approx((7.0, 0.5))
     assert graph.nodes[4] == {"label": "outside", "stay": 0.1, "visits": 0, "births": 0}
     assert [graph.nodes[i]["stay"] for i in range(5)] == [0.7, 0.25, 1.0, 0.95, 0.1]
 
@@ -92,7 +96,9 @@ def test_a_threshold_that_is_no_probability(threshold):
 def test_a_chain_without_a_grid_has_no_positions():
     graph = reachability_graph(NicheChain([[0.5, 0.5], [1.0, 0.0]]))
     assert graph.nodes[0] == {"label": "0", "stay": 0.5, "visits": 0, "births": 0}
-    assert graph.edges[1, 0] == {"probability": 1.0, "count": 0}
+    edge = graph.edges[1, 0]
+    assert (edge["probability"], edge["count"], edge["long_jump"]) == (1.0, 0, False)
+    assert math.isnan(edge["distance"])
 
 
 def test_births_behind_an_estimated_chain():
@@ -122,13 +128,12 @@ def test_attributes_are_plain_values_that_can_be_written(tmp_path):
 
     graph = reachability_graph(_by_hand())
     for _, attributes in graph.nodes(data=True):
-        assert {type(value) for value in attributes.values()} <= {str, float, int, tuple}
+        assert {type(value) for value in attributes.values()} <= {str, float, int}
     for _, _, attributes in graph.edges(data=True):
         assert {type(value) for value in attributes.values()} <= {float, int, bool}
-    for _, attributes in graph.nodes(data=True):
-        attributes.pop("position", None)
-    nx.write_graphml(graph, tmp_path / "chain.graphml")
-    assert nx.read_graphml(tmp_path / "chain.graphml", node_type=int).edges == graph.edges
+    for write, read in ((nx.write_graphml, nx.read_graphml), (nx.write_gexf, nx.read_gexf)):
+        write(graph, tmp_path / "chain")
+        assert set(read(tmp_path / "chain", node_type=int).edges) == set(graph.edges)
 
 
 def _most_probable_paths(transition, i, j):
