@@ -22,17 +22,31 @@ def tabulated(state: Ints, elite: Ints, child: Ints, children: Ints | None = Non
     children : (N,) int64 array, optional
         How many births each entry stands for; by default one.
     """
-    kinds, which = np.unique(np.stack([state, elite, child]), axis=1, return_inverse=True)
-    number = np.bincount(which.ravel(), children, kinds.shape[1]).astype(np.int64)
-    return np.vstack([kinds, number]).T
+    order = np.lexsort((child, elite, state))
+    rows = np.stack([state[order], elite[order], child[order]], axis=1)
+    which = np.cumsum(_differs(rows)) - 1
+    first = np.flatnonzero(np.diff(which, prepend=-1))
+    number = np.bincount(which, None if children is None else children[order], first.size)
+    return np.column_stack([rows[first], number]).astype(np.int64)
 
 
 def elites_of(families: Ints) -> Ints:
     """Which elite each row is of, (F,): numbers from 0 in the order of states, and of elites in them."""
     if not len(families):
         return np.empty(0, np.int64)
-    _, number = np.unique(families[:, :2], axis=0, return_inverse=True)
+    owners = families[:, :2]
+    step = np.diff(owners, axis=0)
+    if ((step[:, 0] > 0) | ((step[:, 0] == 0) & (step[:, 1] >= 0))).all():
+        # As tables of families are.
+        return np.cumsum(_differs(owners)).astype(np.int64) - 1
+    _, number = np.unique(owners, axis=0, return_inverse=True)
     return number.ravel().astype(np.int64)
+
+
+def _differs(rows: Ints) -> NDArray[np.bool_]:
+    """Whether each row is not the one before, (N,)."""
+    new: NDArray[np.bool_] = np.concatenate([[True], (np.diff(rows, axis=0) != 0).any(axis=1)])
+    return new[: len(rows)]
 
 
 def folds_of(elite: Ints, folds: int, rng: np.random.Generator) -> Ints:

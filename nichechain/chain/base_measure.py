@@ -17,6 +17,7 @@ from scipy import sparse
 from nichechain.chain.counts import TransitionCounts
 from nichechain.chain.displacement import Displacement, GridDisplacement
 from nichechain.chain.distance import DistanceDisplacement
+from nichechain.chain.neighbours import NearRows
 from nichechain.core.row_sampler import RowSampler
 from nichechain.niches import GridNiches, Niches
 
@@ -42,8 +43,8 @@ class BaseMeasure:
         Share of births outside, among births of parents inside.
     weights : (3,) float64 array
         Of destination, displacement and uniform.
-    near : (S, S) scipy.sparse.csr_array, optional
-        The part of every row that neighbours speak for, which sums to less than 1; by default none.
+    near : NearRows, optional
+        The part of every row that neighbours speak for; by default none.
     """
 
     niches: Niches
@@ -51,7 +52,7 @@ class BaseMeasure:
     displacement: Displacement
     leaving: float
     weights: Floats
-    near: sparse.csr_array | None = None
+    near: NearRows | None = None
 
     @classmethod
     def pooled(cls, counts: TransitionCounts, weights: Floats) -> BaseMeasure:
@@ -70,7 +71,7 @@ class BaseMeasure:
         landing: Floats,
         moving: Floats,
         weights: Floats,
-        near: sparse.csr_array | None = None,
+        near: NearRows | None = None,
     ) -> BaseMeasure:
         """The base measure of pairs of states, each of which stands for some births of either kind.
 
@@ -117,7 +118,7 @@ class BaseMeasure:
         mixed: Floats = self.weights @ self.components(parent, child)
         if self.near is not None and parent.size:
             mixed *= self.shared[parent]
-            mixed += np.asarray(self.near[parent, child]).ravel()
+            mixed += np.asarray(self.near.matrix[parent, child]).ravel()
         return mixed
 
     def rows(self, parent: Ints) -> Floats:
@@ -135,7 +136,7 @@ class BaseMeasure:
         mixed[~inside] += displaced * self.destination
         if self.near is not None and parent.size:
             mixed *= self.shared[parent, None]
-            mixed += self.near[parent].toarray()
+            mixed += self.near.matrix[parent].toarray()
         return mixed
 
     @cached_property
@@ -143,7 +144,7 @@ class BaseMeasure:
         """The part of every row that is left to the components, (S,)."""
         if self.near is None:
             return np.ones(self.niches.states)
-        left: Floats = np.maximum(1.0 - np.asarray(self.near.sum(axis=1)).ravel(), 0.0)
+        left: Floats = np.maximum(1.0 - self.near.mass, 0.0)
         return left
 
     def sample(self, parent: Ints, rng: np.random.Generator) -> Ints:
@@ -158,7 +159,7 @@ class BaseMeasure:
         child[displaced] = self._sample_displaced(flat[displaced], rng)
         if self.near is not None:
             told = np.flatnonzero(rng.random(flat.size) >= self.shared[flat])
-            child[told] = self._neighbours.draw(flat[told], rng)
+            child[told] = self.near.sample(flat[told], rng)
         return child.reshape(parent.shape)
 
     def _displaced(self, parent: Ints, child: Ints) -> Floats:
@@ -173,10 +174,6 @@ class BaseMeasure:
     @cached_property
     def _destinations(self) -> RowSampler:
         return RowSampler(sparse.csr_array(self.destination[None, :]))
-
-    @cached_property
-    def _neighbours(self) -> RowSampler:
-        return RowSampler(self.near)
 
     @property
     def within(self) -> Floats:

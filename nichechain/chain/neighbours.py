@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,11 +16,37 @@ from nichechain.niches import GridNiches
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+Flags = NDArray[np.bool_]
 
 # Neighbours at most so many cells away speak, with the weight of a standard normal at their distance.
 _REACH = 2
 # One imaginary birth that the pools speak for keeps a niche of silent neighbours from being told nothing.
 _IMAGINARY = 1.0
+_LANDING, _MOVING = 0, 1
+
+
+class _Offset(NamedTuple):
+    """Pairs that speak to the niche this far from their parent's.
+
+    Parameters
+    ----------
+    shift : int
+        How far, in flat ids.
+    weight : float
+    told : (E,) bool array
+        Pairs that have a niche there, which hears where their children landed.
+    moves : (E,) bool array
+        Those whose children would be in the grid, too, or are outside: it hears how far they moved.
+    """
+
+    shift: int
+    weight: float
+    told: Flags
+    moves: Flags
+
+    def pairs(self, kind: int) -> Flags:
+        """The pairs that this niche hears of in this kind."""
+        return self.told if kind == _LANDING else self.moves
 
 
 class Neighbours:
@@ -38,15 +66,32 @@ class Neighbours:
     """
 
     def __init__(self, niches: GridNiches, parent: Ints, child: Ints) -> None:
-        self._states = niches.states
-        pair = parent * niches.states + child
-        parts = list(_told(niches, parent, child))
-        self._birth, self._row, landed, moved, self._weight = (
-            np.concatenate([part[k] for part in parts]) for k in range(5)
-        )
-        self._column = landed, moved
-        self._pair = tuple(_found(pair, self._row * niches.states + column) for column in (landed, moved))
-        self._inside = tuple(column >= 0 for column in self._column)
+        self.states, self.niches = niches.states, len(niches)
+        self.parent, self.child = parent, child
+        self.offsets = list(_offsets(niches, parent, child))
+        pair = parent * self.states + child
+        # Of all that is said, what is said of pairs that have births: whose words, and to which pair.
+        self._heard = [
+            [_seen(pair, *self.words(kind, offset)) for offset in self.offsets]
+            for kind in (_LANDING, _MOVING)
+        ]
+
+    def words(self, kind: int, offset: _Offset) -> tuple[Ints, Ints]:
+        """Pairs that speak, and the codes (row · S + column) of what they speak of."""
+        source = np.flatnonzero(offset.pairs(kind))
+        column = self.child[source]
+        if kind == _MOVING:
+            column = np.where(column < self.niches, column + offset.shift, column)
+        return source, (self.parent[source] + offset.shift) * self.states + column
+
+    def said(self, kind: int, births: Floats) -> Floats:
+        """Births that each niche hears of through each offset, weighted, (K, S)."""
+        told = np.zeros((len(self.offsets), self.states))
+        for row, offset in zip(told, self.offsets, strict=True):
+            heard = np.bincount(self.parent, births * offset.pairs(kind), self.states)
+            here = np.flatnonzero(heard)
+            row[here + offset.shift] = offset.weight * heard[here]
+        return told
 
     def shares(self, landing: Floats, moving: Floats) -> Floats:
         """What neighbours' births of either kind say of each pair, (2, E), at most 1 in all of a row.
@@ -56,64 +101,133 @@ class Neighbours:
         landing, moving : (E,) float64 arrays
             Births of each pair that are of this kind.
         """
-        said = np.zeros((2, landing.size))
+        shares = np.zeros((2, landing.size))
         for kind, births in enumerate((landing, moving)):
-            told = self._share(kind, births)
-            seen = self._pair[kind] >= 0
-            said[kind] = np.bincount(self._pair[kind][seen], told[seen], births.size)
-        return said
+            for offset, (source, target) in zip(self.offsets, self._heard[kind], strict=True):
+                # No two pairs speak of the same one from the same distance.
+                shares[kind, target] += offset.weight * births[source]
+            total = self.said(kind, births).sum(axis=0)
+            shares[kind] /= (total + _IMAGINARY)[self.parent]
+        return shares
 
-    def rows(self, landing: Floats, moving: Floats, weights: Floats) -> sparse.csr_array:
-        """The same for all pairs of states, times the weight of either kind, (S, S)."""
-        parts = []
-        for kind, births in enumerate((landing, moving)):
-            parts.append(weights[kind] * self._share(kind, births)[self._inside[kind]])
-        entry, column, start = self._entries
-        data = np.bincount(entry, np.concatenate(parts), column.size)
-        return sparse.csr_array((data, column, start), shape=(self._states, self._states))
+    def rows(self, landing: Floats, moving: Floats, weights: Floats) -> NearRows:
+        """The same for all pairs of states, times the weight of either kind.
+
+        Parameters
+        ----------
+        landing, moving : (E,) float64 arrays
+        weights : (2,) float64 array
+        """
+        return NearRows(self, np.stack([landing, moving]), weights)
 
     @cached_property
-    def _entries(self) -> tuple[Ints, Ints, Ints]:
-        """Where in a sparse matrix the words of either kind add up; its columns, and starts of rows."""
-        said = [
-            self._row[kept] * self._states + column[kept]
-            for kept, column in zip(self._inside, self._column, strict=True)
-        ]
+    def entries(self) -> tuple[Ints, Ints, Ints]:
+        """Where in a sparse matrix all that is said adds up; its columns, and where its rows start."""
+        said = [self.words(kind, offset)[1] for kind in (_LANDING, _MOVING) for offset in self.offsets]
         code, entry = np.unique(np.concatenate(said), return_inverse=True)
-        start = np.searchsorted(code, np.arange(self._states + 1) * self._states)
-        return entry, code % self._states, start
+        start = np.searchsorted(code, np.arange(self.states + 1) * self.states)
+        return entry, code % self.states, start
 
-    def _share(self, kind: int, births: Floats) -> Floats:
-        told = self._weight * births[self._birth] * self._inside[kind]
-        total = np.bincount(self._row, told, self._states)
-        share: Floats = told / (total + _IMAGINARY)[self._row]
-        return share
+    @cached_property
+    def moves(self) -> Flags:
+        """Pairs that each offset hears of as moved, (K, E)."""
+        return np.stack([offset.moves for offset in self.offsets])
+
+    @cached_property
+    def starts(self) -> Ints:
+        """Where the pairs of each parent start, (S + 1,)."""
+        return np.searchsorted(self.parent, np.arange(self.states + 1)).astype(np.int64)
 
 
-def _told(niches: GridNiches, parent: Ints, child: Ints) -> Iterator[tuple[Ints, Ints, Ints, Ints, Floats]]:
-    """Pair, the niche it speaks to, where its child landed and that niche's would have (or -1), weight."""
-    n, shape = len(niches), np.array(niches.shape)
-    inside = np.flatnonzero(parent < n)
-    start = np.stack(np.unravel_index(parent[inside], niches.shape), axis=1)
-    end = np.stack(np.unravel_index(np.minimum(child[inside], n - 1), niches.shape), axis=1)
-    outside = child[inside] >= n
-    for offset in product(*[range(-_REACH, _REACH + 1)] * shape.size):
-        square = sum(step * step for step in offset)
+@dataclass(frozen=True)
+class NearRows:
+    """The part of every row that neighbours speak for, which sums to less than 1.
+
+    Parameters
+    ----------
+    neighbours : Neighbours
+    births : (2, E) float64 array
+        Births of each pair that are of either kind.
+    weights : (2,) float64 array
+    """
+
+    neighbours: Neighbours
+    births: Floats
+    weights: Floats
+
+    @cached_property
+    def mass(self) -> Floats:
+        """How much of each row it is, (S,)."""
+        mass: Floats = self._through.sum(axis=(0, 1))
+        return mass
+
+    @cached_property
+    def matrix(self) -> sparse.csr_array:
+        """The whole of it, (S, S)."""
+        offsets, states = self.neighbours.offsets, self.neighbours.states
+        parts = []
+        for kind, births in enumerate(self.births):
+            share = self.weights[kind] / (self._said[kind].sum(axis=0) + _IMAGINARY)
+            for offset in offsets:
+                source = offset.pairs(kind)
+                row = self.neighbours.parent[source] + offset.shift
+                parts.append(offset.weight * births[source] * share[row])
+        entry, column, start = self.neighbours.entries
+        data = np.bincount(entry, np.concatenate(parts), column.size)
+        return sparse.csr_array((data, column, start), shape=(states, states))
+
+    def sample(self, rows: Ints, rng: np.random.Generator) -> Ints:
+        """A column for each of some rows (N,) that it is a part of."""
+        from nichechain.chain import neighbours_steps
+
+        offsets = self.neighbours.offsets
+        drawn = np.empty(rows.size, np.int64)
+        neighbours_steps.draw(
+            (self._through.reshape(-1, self.neighbours.states), self.mass),
+            np.array([offset.shift for offset in offsets]),
+            self.neighbours.moves,
+            (self.neighbours.starts, self.neighbours.child, self.births),
+            self.neighbours.niches,
+            (rows, rng.random((rows.size, 2))),
+            drawn,
+        )
+        return drawn
+
+    @cached_property
+    def _said(self) -> Floats:
+        """Births that each row hears of by kind and offset, (2, K, S)."""
+        return np.stack([self.neighbours.said(kind, births) for kind, births in enumerate(self.births)])
+
+    @cached_property
+    def _through(self) -> Floats:
+        """The part of each row that comes through each kind and offset, (2, K, S)."""
+        share = self.weights[:, None] / (self._said.sum(axis=1) + _IMAGINARY)
+        through: Floats = self._said * share[:, None, :]
+        return through
+
+
+def _offsets(niches: GridNiches, parent: Ints, child: Ints) -> Iterator[_Offset]:
+    n, shape = len(niches), niches.shape
+    inside, outside = parent < n, child >= n
+    start = np.unravel_index(np.minimum(parent, n - 1), shape)
+    end = np.unravel_index(np.minimum(child, n - 1), shape)
+    strides = [int(np.prod(shape[axis + 1 :])) for axis in range(len(shape))]
+    for steps in product(*[range(-_REACH, _REACH + 1)] * len(shape)):
+        square = sum(step * step for step in steps)
         if not 0 < square <= _REACH**2:
             continue
-        cell, moved = start + offset, end + offset
-        told = ((cell >= 0) & (cell < shape)).all(axis=1)
-        stays = ((moved >= 0) & (moved < shape)).all(axis=1)
-        there = np.ravel_multi_index(tuple(np.clip(moved, 0, shape - 1).T), niches.shape)
-        there = np.where(outside, n, np.where(stays, there, -1)).astype(np.int64)
-        to = np.ravel_multi_index(tuple(cell[told].T), niches.shape).astype(np.int64)
-        weight = np.full(to.size, np.exp(-0.5 * square))
-        yield inside[told], to, child[inside][told], there[told], weight
+        told, stays = inside.copy(), np.ones(child.size, bool)
+        for cell, moved, step, size in zip(start, end, steps, shape, strict=True):
+            told &= (cell + step >= 0) & (cell + step < size)
+            stays &= (moved + step >= 0) & (moved + step < size)
+        shift = sum(step * stride for step, stride in zip(steps, strides, strict=True))
+        yield _Offset(shift, float(np.exp(-0.5 * square)), told, told & (stays | outside))
 
 
-def _found(sorted_: Ints, wanted: Ints) -> Ints:
-    """Where each wanted number stands among sorted ones, -1 where it does not."""
-    if not sorted_.size:
-        return np.full(wanted.size, -1, np.int64)
-    place = np.minimum(np.searchsorted(sorted_, wanted), sorted_.size - 1)
-    return np.where(sorted_[place] == wanted, place, -1).astype(np.int64)
+def _seen(pair: Ints, source: Ints, code: Ints) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    """Of words about pairs of these codes, those about pairs that there are: whose, and about which."""
+    if not pair.size:
+        return np.zeros(0, np.int32), np.zeros(0, np.int32)
+    place = np.minimum(np.searchsorted(pair, code), pair.size - 1)
+    there = pair[place] == code
+    return source[there].astype(np.int32), place[there].astype(np.int32)

@@ -64,7 +64,7 @@ class PooledTransition:
         states, n = base.niches.states, len(base.niches)
         anywhere, displaced, uniform = base.weights
         if base.near is not None:
-            kept = (kept + sparse.diags_array(prior) @ base.near).tocsr()
+            kept = (kept + sparse.diags_array(prior) @ base.near.matrix).tocsr()
             prior = prior * base.shared
         outside = np.arange(states) >= n
         shares = np.stack(

@@ -13,13 +13,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
 from scipy.special import digamma
 
 from nichechain.chain.base_measure import BaseMeasure
 from nichechain.chain.counts import TransitionCounts
 from nichechain.chain.empirical_bayes import design_effect, strength_of
-from nichechain.chain.neighbours import Neighbours
+from nichechain.chain.neighbours import NearRows, Neighbours
 from nichechain.niches import GridNiches, Niches
 
 Floats = NDArray[np.float64]
@@ -174,7 +173,7 @@ class _Kinds:
         return self._pooled(*self._pools(attributed), pools / pools.sum(), near)
 
     def _pooled(
-        self, landing: Floats, moving: Floats, weights: Floats, near: sparse.csr_array | None = None
+        self, landing: Floats, moving: Floats, weights: Floats, near: NearRows | None = None
     ) -> BaseMeasure:
         return BaseMeasure.of_births(self.niches, self._parent, self._child, landing, moving, weights, near)
 

@@ -66,7 +66,7 @@ def run(arguments: Sequence[str]) -> int:
             "bounds and outside"
         )
     births = [read.read_births(archive.folder, archive.meta) for archive in archives]
-    with progress.spinner("resampling"):
+    with progress.adding(2 * command.resamples, "resamples") as tell:
         found = contrast(
             births[0],
             births[1],
@@ -78,6 +78,7 @@ def run(arguments: Sequence[str]) -> int:
             resamples=command.resamples,
             draws=command.draws,
             seed=command.seed,
+            on_done=tell,
         )
     if command.format == "csv":
         print(found.to_frame().to_csv(index=False), end="")

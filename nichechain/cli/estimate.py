@@ -170,17 +170,20 @@ def _show_comparison(found: Comparison) -> None:
 
 
 def _stability(command: EstimateCommand, archive: Archive) -> None:
-    from nichechain.validation.stability import rank_stability
+    from nichechain.validation.stability import FRACTIONS, rank_stability
 
-    with progress.spinner("thinning births"):
+    repeats = 3 if command.repeats is None else command.repeats
+    with progress.adding(1 + max(0, repeats) * (2 + len(FRACTIONS)), "rankings") as tell:
         found = rank_stability(
             archive.counts,
             thin=command.thin or "elite",
-            repeats=3 if command.repeats is None else command.repeats,
+            repeats=repeats,
             min_births=command.min_births,
             estimator=command.estimator,
             seed=command.seed,
+            on_done=tell,
         )
+    with progress.spinner("the level over steps and births"):
         course = _course(command, archive)
     if command.out is not None:
         _draw(found, course, command.out)

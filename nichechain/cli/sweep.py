@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from nichechain.cli import output, parsing
+from nichechain.cli import output, parsing, progress
 from nichechain.core.checks import check_at_least
 from nichechain.core.errors import NichechainError
 
@@ -46,18 +46,24 @@ def run(arguments: Sequence[str]) -> int:
     command = parsing.parse(SweepCommand, arguments)
     _check(command)
     from nichechain.archive.archive import load
-    from nichechain.validation.grid_size import sweep
+    from nichechain.validation.grid_size import default_sizes, sweep
 
-    found = sweep(
-        load(command.path),
-        None if command.sizes is None else parse_sizes(command.sizes),
-        behavior=None if command.behavior is None else _numbers(command.behavior),
-        l=command.l,
-        lineages=command.lineages,
-        min_births=command.min_births,
-        draws=command.draws,
-        seed=command.seed,
-    )
+    archive = load(command.path)
+    sizes = None if command.sizes is None else parse_sizes(command.sizes)
+    tried = len(default_sizes(len(archive.niches.bounds)) if sizes is None else sizes)
+    behavior = None if command.behavior is None else _numbers(command.behavior)
+    with progress.adding(tried, "grids") as tell:
+        found = sweep(
+            archive,
+            sizes,
+            behavior=behavior,
+            l=command.l,
+            lineages=command.lineages,
+            min_births=command.min_births,
+            draws=command.draws,
+            seed=command.seed,
+            on_done=tell,
+        )
     if command.out is not None:
         _draw(found, command.out)
     if command.json:

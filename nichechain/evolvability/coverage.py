@@ -189,6 +189,41 @@ def coverage_by_generation(
     return found
 
 
+def coverage_so_far(
+    transition: LinearOperator, first: LinearOperator, longest: int, lineages: int, counted: int
+) -> Floats:
+    """What :func:`expected_coverage` gives for 1 to ``longest`` steps, (m, longest), at the cost of the last.
+
+    Parameters
+    ----------
+    transition : (S, S) row-stochastic map
+    first : (m, S) map
+        Distribution of generation 1 for each of m roots.
+    longest, lineages : int
+        At least 1.
+    counted : int
+        Only the first so many states are niches that count.
+    """
+    states = transition.shape[0]
+    counted = _counted(counted, states)
+    sizes = _sizes(lineages)
+    check_at_least(1, longest=longest)
+    transition, first = _faster(transition), _faster(first)
+    found = np.zeros((first.shape[0], longest))
+    for start in range(0, counted, _COLUMNS):
+        targets = np.arange(start, min(start + _COLUMNS, counted))
+        hit = np.zeros((states, targets.size))
+        hit[targets, targets - start] = 1.0
+        for step in range(longest):
+            if step:
+                hit = _columns(transition, hit, targets) if step == 1 else transition @ hit
+                # A lineage that stands on its target has visited it, wherever it goes next.
+                hit[targets, targets - start] = 1.0
+            (some,) = at_least_once(first @ hit, sizes)
+            found[:, step] += some.sum(axis=1)
+    return found
+
+
 def at_least_once(probability: Floats, trials: Iterable[int]) -> Iterator[Floats]:
     """P(an event of this probability happens in at least one trial), for each number of trials."""
     # log1p and expm1 keep the digits of a tiny probability, which 1 - (1 - h)**U rounds away.

@@ -127,7 +127,7 @@ def simulated_coverage(
             else:
                 first = np.repeat(roots[block], lineages).reshape(-1, lineages)
             states = urns.walks(first.astype(np.int64), moves, rng, roots=roots is not None)
-            coverage[draw, block], noise[draw, block] = _covered(
+            coverage[draw, block], noise[draw, block] = covered(
                 states[:, 0 if counts_first else lineages :], lineages, sizes, urns.niches
             )
         if tell is not None:
@@ -135,7 +135,7 @@ def simulated_coverage(
     return Simulated(coverage, noise)
 
 
-def _covered(states: Ints, lineages: int, sizes: list[int], niches: int) -> tuple[Floats, Floats]:
+def covered(states: Ints, lineages: int, sizes: list[int], niches: int) -> tuple[Floats, Floats]:
     """Niches visited by U of M lineages, and its variance as two halves tell it: (g, k) each."""
     from nichechain.evolvability import urn_steps
 

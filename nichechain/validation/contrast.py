@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 
 import numpy as np
@@ -18,8 +18,10 @@ from nichechain.chain.estimators import estimate, refitted
 from nichechain.core.checks import check_at_least
 from nichechain.core.errors import NichechainError
 from nichechain.core.randomness import Purpose, keyed
-from nichechain.evolvability.coverage import expected_coverage, rarefied_coverage
+from nichechain.evolvability.coverage import rarefied_coverage
+from nichechain.evolvability.level import level
 from nichechain.evolvability.question import Question
+from nichechain.execution.side_by_side import side_by_side
 from nichechain.niches import Niches
 
 Floats = NDArray[np.float64]
@@ -112,6 +114,7 @@ def contrast(
     resamples: int = 100,
     draws: int = 4,
     seed: int = 0,
+    on_done: Callable[[int], None] | None = None,
 ) -> Contrast:
     """Compare the births of two archives.
 
@@ -135,6 +138,8 @@ def contrast(
         Posterior draws of T for each resample.
     seed : int
         Of resamples and draws.
+    on_done : callable, optional
+        Told how many more resamples are done, of both archives together.
 
     Returns
     -------
@@ -184,11 +189,8 @@ def contrast(
             posterior = refitted(fitted, counts)  # noqa: B023  # called in this round only
             found = np.zeros(2)
             for _ in range(draws):
-                T = posterior.draw(rng)
-                covered = expected_coverage(
-                    T, T[compared], question.steps, [lineages, 1], counted=len(niches)
-                )
-                found += covered.mean(axis=0) / draws
+                one = replace(question, seed=int(rng.integers(2**31)))
+                found += level(posterior, compared, one, [lineages, 1]) / draws
             visits = counts.visits
             return np.append(
                 found, rarefied_coverage(visits, min(size, int(visits.sum())), counted=len(niches))
@@ -196,10 +198,13 @@ def contrast(
 
         # Both are drawn alike, so that archives of the same births do not differ.
         values.append(figures(counts, _VALUE_DRAWS, keyed(seed, Purpose.POSTERIOR)))
-        again = [
-            figures(side.counts(multiplicity), draws, rng)
-            for multiplicity, rng in side.resampled(resamples, seed, number)
-        ]
+
+        def figures_again(resample: int) -> Floats:
+            rng = keyed(seed, Purpose.RESAMPLING, resample)
+            again = side.counts(side.resampled(rng))  # noqa: B023
+            return figures(again, draws, rng)
+
+        again = side_by_side(figures_again, range(number, 2 * resamples, 2), on_done)
         correction = side.clusters / max(1, side.clusters - 1)
         spreads.append(np.var(again, axis=0, ddof=1) * correction)
         freedom.append(side.clusters - 1)
@@ -321,9 +326,6 @@ class _Side:
         np.add.at(visits, self.child, n)
         return replace(counts, visits=visits)
 
-    def resampled(self, resamples: int, seed: int, side: int) -> Iterator[tuple[Ints, np.random.Generator]]:
-        """How often each cluster was drawn, and a generator for what follows."""
-        for number in range(resamples):
-            rng = keyed(seed, Purpose.RESAMPLING, 2 * number + side)
-            drawn = rng.integers(self.clusters, size=self.clusters)
-            yield np.bincount(drawn, minlength=self.clusters), rng
+    def resampled(self, rng: np.random.Generator) -> Ints:
+        """How often each cluster was drawn, (clusters,)."""
+        return np.bincount(rng.integers(self.clusters, size=self.clusters), minlength=self.clusters)

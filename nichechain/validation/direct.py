@@ -21,8 +21,8 @@ from nichechain.core.intervals import drawn_interval
 from nichechain.core.randomness import Purpose, keyed
 from nichechain.core.row_sampler import RowSampler
 from nichechain.evolvability.averaging import spread_of
-from nichechain.evolvability.coverage import expected_coverage, rarefied_coverage
-from nichechain.evolvability.question import Question, dense
+from nichechain.evolvability.coverage import coverage_so_far, rarefied_coverage
+from nichechain.evolvability.question import MOST_EXACT, Question, dense
 from nichechain.evolvability.record import draw_children, own_strength
 from nichechain.niches import Niches
 from nichechain.validation.rollouts import Lineages, niches_reached
@@ -185,15 +185,15 @@ def compare(
         matrix, rows = drawn.onward, dense(drawn.children(lineages.roots))
         rng = keyed(seed, Purpose.FIRST_GENERATION, number)
         first = np.concatenate([rows, draw_children(counts, rows, rng, strength)])
-        values.append(
-            np.stack(
-                [expected_coverage(matrix, first, k + 1, size, counted=n) for k in range(generations)], axis=1
-            )
-        )
         rng = keyed(seed, Purpose.PREDICTION, number)
         begin = RowSampler(first).draw(np.tile(np.repeat(np.arange(2 * roots), size), _REPLICAS), rng)
         walks = simulate_lineages(matrix, begin.reshape(-1, size), generations, rng)
         simulated.append(niches_reached(walks, n).reshape(_REPLICAS, 2 * roots, generations))
+        if chain.states <= MOST_EXACT:
+            values.append(coverage_so_far(matrix, first, generations, size, n))
+        else:
+            # The error of so many replicas is small beside that of the lineages really run.
+            values.append(simulated[-1].mean(axis=0))
     value = np.mean(values, axis=0)
     spread = np.moveaxis(np.concatenate(simulated), 0, 2).astype(np.float64)
     middle = spread.mean(axis=2, keepdims=True)

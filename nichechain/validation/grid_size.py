@@ -8,7 +8,7 @@ on the grid size in its section "Towards better evolvability definitions").
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING
 
@@ -26,6 +26,7 @@ from nichechain.core.errors import NichechainError
 from nichechain.core.randomness import Purpose, keyed
 from nichechain.evolvability.niches import answer
 from nichechain.evolvability.question import Question, Root
+from nichechain.execution.side_by_side import side_by_side
 from nichechain.niches import GridNiches
 from nichechain.validation.held_out import probability_of
 
@@ -179,6 +180,7 @@ def sweep(
     draws: int = 10,
     folds: int = 5,
     seed: int = 0,
+    on_done: Callable[[int], None] | None = None,
 ) -> Sweep:
     """Bin the births of an archive into grids of several sizes and see what each could tell.
 
@@ -206,6 +208,8 @@ def sweep(
         Parts of the elites that are held out in turn, for ``information``.
     seed : int
         Of folds and draws.
+    on_done : callable, optional
+        Told how many more grids are done.
 
     Raises
     ------
@@ -237,28 +241,28 @@ def sweep(
         if not ((place >= archive.niches.lower) & (place <= archive.niches.upper)).all():
             shown = ", ".join(f"{x:g}" for x in place)
             raise NichechainError(f"behavior is {shown}, which is out of the archive's bounds")
-    found = []
-    for niches in grids:
+
+    def binned(niches: GridNiches) -> GridSize:
         counts = _binned(niches, parents, children, elite)
         chain = estimate(counts)
         root = int(niches.of(place[None])[0])
         score = answer(chain, Root(chain, niche=root), question)
-        found.append(
-            GridSize(
-                niches.shape,
-                len(niches),
-                1.0 - counts.never_filled / len(niches),
-                counts.rows_observed / len(niches),
-                float(np.median(counts.births[: len(niches)][counts.births[: len(niches)] > 0])),
-                _known(chain, counts, min_births),
-                *_staying(counts),
-                _entropy(counts),
-                _information(counts, folds, seed),
-                score.value,
-                score.low,
-                score.high,
-            )
+        return GridSize(
+            niches.shape,
+            len(niches),
+            1.0 - counts.never_filled / len(niches),
+            counts.rows_observed / len(niches),
+            float(np.median(counts.births[: len(niches)][counts.births[: len(niches)] > 0])),
+            _known(chain, counts, min_births),
+            *_staying(counts),
+            _entropy(counts),
+            _information(counts, folds, seed),
+            score.value,
+            score.low,
+            score.high,
         )
+
+    found = side_by_side(binned, grids, on_done)
     config = archive.config
     built = config.shape if config.niches == "grid" else None
     return Sweep(tuple(found), tuple(place.tolist()), len(children), built, l, lineages, min_births)

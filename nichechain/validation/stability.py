@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
@@ -19,6 +19,7 @@ from nichechain.core.errors import NichechainError
 from nichechain.core.randomness import Purpose, keyed
 from nichechain.evolvability.niches import answer_for_niches
 from nichechain.evolvability.question import Question
+from nichechain.execution.side_by_side import side_by_side
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -130,6 +131,7 @@ def rank_stability(
     estimator: Estimator = "empirical-bayes",
     draws: int = 20,
     seed: int = 0,
+    on_done: Callable[[int], None] | None = None,
 ) -> RankStability:
     """Thin the births, rank the niches again, and see how far the ranking moved.
 
@@ -150,6 +152,8 @@ def rank_stability(
     estimator : {"empirical-bayes", "dirichlet", "mle"}
     seed : int
         Of thinning and draws.
+    on_done : callable, optional
+        Told how many more rankings are done, of ``1 + repeats * (2 + F)``.
 
     Returns
     -------
@@ -185,22 +189,18 @@ def rank_stability(
         # Draws of their own, so that rankings do not agree for having been drawn alike.
         return answer_for_niches(chain, replace(question, seed=seed + number), roots=ranked).value[ranked]
 
-    full = scores(counts, 0)
-    spearman, births = np.empty((parts.size, repeats)), np.empty((parts.size, repeats))
-    level, halves = np.empty_like(spearman), np.empty(repeats)
-    number = 0
+    kept = [counts]
     for repeat in range(repeats):
         rank = _Thinner(counts, thin, keyed(seed, Purpose.THINNING, repeat))
-        first, second = rank.part(0.0, 0.5), rank.part(0.5, 1.0)
-        halves[repeat] = _agreement(scores(first, number + 1), scores(second, number + 2))
-        number += 2
-        for k, part in enumerate(parts):
-            thinned = rank.part(0.0, part)
-            number += 1
-            births[k, repeat] = thinned.births.sum()
-            found = scores(thinned, number)
-            spearman[k, repeat] = _agreement(full, found)
-            level[k, repeat] = found.mean()
+        kept += [rank.part(0.0, 0.5), rank.part(0.5, 1.0), *(rank.part(0.0, part) for part in parts)]
+    full, *found = side_by_side(lambda number: scores(kept[number], number), range(len(kept)), on_done)
+    each = parts.size + 2
+    halves = np.array([_agreement(*found[each * repeat :][:2]) for repeat in range(repeats)])
+    # Halves left out, parts by repeats.
+    thinned = [[each * repeat + 2 + part for repeat in range(repeats)] for part in range(parts.size)]
+    births = np.array([[kept[1 + number].births.sum() for number in row] for row in thinned], np.float64)
+    spearman = np.array([[_agreement(full, found[number]) for number in row] for row in thinned])
+    level = np.array([[found[number].mean() for number in row] for row in thinned])
     return RankStability(
         parts,
         births.mean(axis=1),

@@ -52,7 +52,7 @@ def test_neighbours_say_what_a_loop_over_them_says():
     expected = _said_by_neighbours(PLANE, landing)
     neighbours = Neighbours(PLANE, i, j)
     np.testing.assert_allclose(neighbours.shares(births, births), expected[:, i, j], atol=1e-14)
-    rows = neighbours.rows(births, births, np.array([0.3, 0.5])).toarray()
+    rows = neighbours.rows(births, births, np.array([0.3, 0.5])).matrix.toarray()
     np.testing.assert_allclose(rows, 0.3 * expected[0] + 0.5 * expected[1], atol=1e-14)
     # A row's own births say nothing of it.
     landing[4] = 0.0
@@ -84,7 +84,7 @@ def test_draws_of_states_follow_rows_in_which_neighbours_have_a_say():
     # One half of the plane sends its children to one place, the other half to another.
     child = np.where(rng.random(400) < 0.8, np.where(parent < 6, 2, 9), rng.integers(13, size=400))
     prior = fit_prior(TransitionCounts.from_pairs(parent, child, PLANE))
-    assert prior.base.near.sum() > 0
+    assert prior.base.near.mass.sum() > 0
     size = 20_000
     drawn = prior.base.sample(np.repeat(np.arange(13), size), np.random.default_rng(4)).reshape(13, size)
     rows = prior.base.rows(np.arange(13))
