@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nichechain.chain.estimators import with_posterior
+from nichechain.chain.lineages import urns_of
 from nichechain.chain.posterior import DirichletPosterior
-from nichechain.chain.urns import urns_of
 from nichechain.core.randomness import Purpose, keyed
 from nichechain.evolvability.coverage import expected_coverage
 from nichechain.evolvability.question import Question
@@ -45,17 +45,17 @@ def level(posterior: DirichletPosterior, roots: Ints, question: Question, sizes:
     for stand for them, and their lineages are simulated as in :mod:`nichechain.evolvability.urns`.
     """
     chain = with_posterior(posterior.counts, posterior, "a draw")
-    if not question.by_urns(chain):
+    if question.by_urns(chain):
+        few = np.unique(np.linspace(0, roots.size - 1, min(roots.size, _MOST_ROOTS)).astype(np.int64))
+        lineages = max(2, *sizes)
+        urns = urns_of(posterior, keyed(question.seed, Purpose.POSTERIOR, 0))
+        rng = keyed(question.seed, Purpose.WALKS, 0)
+        first = np.repeat(roots[few], lineages).reshape(-1, lineages)
+        states = urns.walks(first, question.l, rng, roots=True)
+        found, _ = covered(states[:, lineages:], lineages, sizes, chain.n_niches)
+    else:
         (drawn,) = replace(question, draws=1).samples(chain)
-        covered_by_all = expected_coverage(
-            drawn.onward, drawn.children(roots), question.l, sizes, counted=chain.n_niches
-        )
-        return covered_by_all.mean(axis=0)
-    some = roots[np.unique(np.linspace(0, roots.size - 1, min(roots.size, _MOST_ROOTS)).astype(np.int64))]
-    lineages = max(2, *sizes)
-    urns = urns_of(posterior, keyed(question.seed, Purpose.POSTERIOR, 0))
-    rng = keyed(question.seed, Purpose.WALKS, 0)
-    states = urns.walks(np.repeat(some, lineages).reshape(-1, lineages), question.l, rng, roots=True)
-    visited, _ = covered(states[:, lineages:], lineages, sizes, chain.n_niches)
-    mean: Floats = visited.mean(axis=0)
+        first_rows = drawn.children(roots)
+        found = expected_coverage(drawn.onward, first_rows, question.l, sizes, counted=chain.n_niches)
+    mean: Floats = found.mean(axis=0)
     return mean
