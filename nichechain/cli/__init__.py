@@ -18,6 +18,7 @@ COMMANDS = {
     "evolvability": "l-evolvability of niches, or of an elite",
     "landscape": "sensitivity, evolvability and dissimila of the elites of an archive",
     "walks": "walks under pressure and with other metrics, tested and reported",
+    "study": "searches by several selections of parents, compared and reported",
     "estimate": "the estimate of T, how well it foretells births, and whether they are enough",
     "compare": "l-evolvability, reach and coverage of one archive against another",
     "verify": "whether an archive is what its configuration leads to, to the last bit",

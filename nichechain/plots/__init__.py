@@ -7,6 +7,7 @@ from nichechain.plots.graphs import plot_reachability, plot_wormholes
 from nichechain.plots.growth import plot_generations, plot_lineages
 from nichechain.plots.maps import plot_elites, plot_evolvability, plot_reach, plot_uncertainty, plot_visits
 from nichechain.plots.matrix import plot_transitions
+from nichechain.plots.searches import plot_filled
 from nichechain.plots.validation import (
     plot_calibration,
     plot_filling,
@@ -23,6 +24,7 @@ __all__ = [
     "plot_classes",
     "plot_elites",
     "plot_evolvability",
+    "plot_filled",
     "plot_filling",
     "plot_generations",
     "plot_lineages",

@@ -20,6 +20,7 @@ from nichechain.domains.policies.controllers import MLP
 from nichechain.evolvability.reach import reach
 from nichechain.landscape import measure_archive
 from nichechain.niches import CVTNiches, GridNiches
+from nichechain.studies.searches import SelectionStudy, run_searches
 from nichechain.walks import WalkConfig
 
 
@@ -88,6 +89,9 @@ def world(tmp_path_factory: pytest.TempPathFactory) -> SimpleNamespace:
     )
     here = _Here()
     studies.run(study, folder / "study", here)
+    small = nc.BuildConfig("arm", (3, 3), arm.bounds, evaluations=60, initial=30, scale=0.2)
+    selection_study = SelectionStudy(small, ("uniform", "reach"), runs=2, elites=1, offspring=2)
+    run_searches(selection_study, folder / "selections", here)
     chain = archive.chain()
     filled = archive.elites.niche[archive.elites.niche < len(archive.niches)]
     lineages = validation.run_lineages(archive, filled[:4], here, l=2, lineages=3, offspring=2)
@@ -109,6 +113,8 @@ def world(tmp_path_factory: pytest.TempPathFactory) -> SimpleNamespace:
         other_config=other,
         log=folder / "log.csv",
         study=folder / "study",
+        selection_study=selection_study,
+        selections=folder / "selections",
         fresh=lambda: folder / f"fresh-{next(number)}",
         scheduler=_scheduler,
         chain=chain,

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from nichechain.studies import Condition
+from nichechain.studies.searches import read_searches
 
 from .table import (
     NOT_A_NUMBER,
@@ -112,6 +113,29 @@ CALLS = (
     Call("studies.read_study", lambda w: {"folder": w.study}, {"folder": ("/no/such/folder",)}),
     Call("studies.read_records", lambda w: {"folder": w.study}, {"folder": ("/no/such/folder",)}),
     Call("studies.read_births", lambda w: {"folder": w.study}, {"folder": ("/no/such/folder",)}),
+    Call(
+        "studies.searches.SelectionStudy",
+        lambda w: {"config": w.config},
+        {
+            "selections": ((), ("reach",), ("uniform", "uniform"), ("uniform", "no-such-thing"), "uniform"),
+            "runs": whole(1),
+            "elites": whole(-1),
+            "offspring": whole(1),
+        },
+    ),
+    Call(
+        "studies.searches.run_searches",
+        lambda w: {"study": w.selection_study, "folder": w.selections, "executor": w.here},
+        {"folder": (Made(lambda w: w.log, "a-file"),)},
+    ),
+    Call(
+        "studies.searches.read_searches", lambda w: {"folder": w.selections}, {"folder": ("/no/such/folder",)}
+    ),
+    Call(
+        "studies.searches.compare_selections",
+        lambda w: {"study": w.selection_study, "records": read_searches(w.selections)[1]},
+        {"records": (Made(lambda w: read_searches(w.selections)[1].slice(0, 0), "no-search"),)},
+    ),
     Call(
         "studies.statistics.pressure_test",
         lambda w: {"pressure": [0, 0, 1, 1], "values": [1, 2, 3, 4], "resamples": 20},

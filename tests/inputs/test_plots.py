@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from nichechain.domains import Motion
+from nichechain.studies.searches import read_searches
 
 from .table import (
     LINEAGES,
@@ -103,6 +104,11 @@ CALLS = (
         "plots.plot_runs",
         lambda w: {"records": w.records, "ax": w.axes(), "step": 0},
         {"records": _EMPTY, "step": (-1, 99, "last"), **_WALKS},
+    ),
+    Call(
+        "plots.plot_filled",
+        lambda w: {"records": read_searches(w.selections)[1].to_pandas(), "ax": w.axes()},
+        {"records": (Made(lambda w: w.births, "births"),), "selections": (("no-such-thing",),)},
     ),
     Call(
         "plots.draw_study",
