@@ -24,6 +24,9 @@ _CELLS = 8_000_000
 # Target niches treated together.
 _COLUMNS = 128
 
+# Every so many steps it is seen whether anything still changes by more than rounding.
+_LOOK, _SETTLED = 64, 1e-15
+
 # Above this share of nonzeros a dense product is faster than a sparse one.
 _DENSE = 0.3
 
@@ -112,7 +115,8 @@ def visit_probabilities(
     Notes
     -----
     With H_k[i, j] = P(j is i or occurs within k transitions from i), conditioning on the first
-    transition gives H_k = T · H_{k−1} with its diagonal set to 1. Columns of H do not depend on
+    transition gives H_k = T · H_{k−1} with its diagonal set to 1, until no entry grows by more than
+    rounding: the largest growth of all entries never grows again. Columns of H do not depend on
     each other, so a block of them at a time bounds the memory.
     """
     states = transition.shape[0]
@@ -124,9 +128,12 @@ def visit_probabilities(
         hit = np.zeros((states, targets.size))
         hit[targets, targets - start] = 1.0
         for step in range(steps - 1):
+            before = hit
             hit = _columns(transition, hit, targets) if step == 0 else transition @ hit
             # A lineage that stands on its target has visited it, wherever it goes next.
             hit[targets, targets - start] = 1.0
+            if step % _LOOK == _LOOK - 1 and np.abs(hit - before).max() <= _SETTLED:
+                break
         yield targets, first @ hit
 
 
@@ -186,41 +193,6 @@ def coverage_by_generation(
                 found[:, step, k] += some.sum(axis=1)
             # A lineage that stands on its target has visited it, wherever it goes next.
             hit[targets, targets - start] = 1.0
-    return found
-
-
-def coverage_so_far(
-    transition: LinearOperator, first: LinearOperator, longest: int, lineages: int, counted: int
-) -> Floats:
-    """What :func:`expected_coverage` gives for 1 to ``longest`` steps, (m, longest), at the cost of the last.
-
-    Parameters
-    ----------
-    transition : (S, S) row-stochastic map
-    first : (m, S) map
-        Distribution of generation 1 for each of m roots.
-    longest, lineages : int
-        At least 1.
-    counted : int
-        Only the first so many states are niches that count.
-    """
-    states = transition.shape[0]
-    counted = _counted(counted, states)
-    sizes = _sizes(lineages)
-    check_at_least(1, longest=longest)
-    transition, first = _faster(transition), _faster(first)
-    found = np.zeros((first.shape[0], longest))
-    for start in range(0, counted, _COLUMNS):
-        targets = np.arange(start, min(start + _COLUMNS, counted))
-        hit = np.zeros((states, targets.size))
-        hit[targets, targets - start] = 1.0
-        for step in range(longest):
-            if step:
-                hit = _columns(transition, hit, targets) if step == 1 else transition @ hit
-                # A lineage that stands on its target has visited it, wherever it goes next.
-                hit[targets, targets - start] = 1.0
-            (some,) = at_least_once(first @ hit, sizes)
-            found[:, step] += some.sum(axis=1)
     return found
 
 

@@ -91,6 +91,7 @@ def l_evolvability(
 
 def answer(chain: NicheChain, root: Root, question: Question) -> Evolvability:
     """What :func:`l_evolvability` answers to a question that has been checked."""
+    question.warn_if_long(chain)
     if question.by_urns(chain):
         return replace(_one_by_urns(chain, root, question), births=root.births)
     own = root.visited(question)
@@ -149,6 +150,7 @@ def answer_for_niches(
     """
     n, lineages = chain.n_niches, question.lineages
     asked = np.arange(n) if roots is None else roots
+    question.warn_if_long(chain, asked.size)
     if question.by_urns(chain):
         return _by_urns(chain, question, asked, tell)
     size = question.repeats_of_each(chain)

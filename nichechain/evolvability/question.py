@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy import sparse
 
 from nichechain.chain.lineages import scattered_rows
 from nichechain.chain.model import NicheChain, Transition
@@ -27,6 +29,9 @@ DRAWS = 50
 MOST_EXACT = 1_000
 """States up to which l-evolvability of an estimated chain is computed in closed form by default."""
 
+# Seconds of which whoever asks is told before, and what a processor does in one of them.
+_LONG = 600.0
+_MOVES_A_SECOND, _SUMS_A_SECOND = 4e6, 2e10
 # Lineages that are longer or more numerous cost more to simulate than their closed form.
 _LONGEST, _MOST_LINEAGES = 1_000, 10_000
 
@@ -136,6 +141,33 @@ class Question:
         """Whether rows of T are only drawn where lineages enter them, since there are many."""
         small = chain.states <= MOST_EXACT or self.l > _LONGEST or self.lineages > _MOST_LINEAGES
         return self.method == "auto" and chain.posterior is not None and not small
+
+    def warn_if_long(self, chain: NicheChain, roots: int = 1) -> None:
+        """Say so before it begins where an answer could take over ten minutes.
+
+        Parameters
+        ----------
+        chain : NicheChain
+        roots : int
+            Roots that are asked for.
+        """
+        samples = self._samples(chain, False)
+        if self.method == "monte-carlo":
+            moves = float(roots) * max(samples, self.repeats) * self.lineages * self.steps
+            cost = moves / _MOVES_A_SECOND
+        elif self.by_urns(chain):
+            cost = float(roots) * samples * 2 * self.lineages * self.steps / _MOVES_A_SECOND
+        else:
+            given = chain.posterior is None and sparse.issparse(chain.operator)
+            entries = chain.operator.nnz if given else chain.states**2  # type: ignore[union-attr]
+            # Longer ones are mostly over when nothing changes any more.
+            products = samples * min(self.steps, _LONGEST)
+            cost = 2.0 * products * entries * chain.n_niches / _SUMS_A_SECOND
+        if cost > _LONG:
+            warnings.warn(
+                f"this could take {cost / 60:.0f} minutes: ask for fewer roots, lineages, generations or draws",
+                stacklevel=3,
+            )
 
     def transitions(self, chain: NicheChain, *, redraw: bool = False) -> Iterator[Transition]:
         """T itself where it is given, draws from its posterior where it is estimated with one.

@@ -21,7 +21,7 @@ from nichechain.core.intervals import drawn_interval
 from nichechain.core.randomness import Purpose, keyed
 from nichechain.core.row_sampler import RowSampler
 from nichechain.evolvability.averaging import spread_of
-from nichechain.evolvability.coverage import coverage_so_far, rarefied_coverage
+from nichechain.evolvability.coverage import coverage_by_generation, rarefied_coverage
 from nichechain.evolvability.question import MOST_EXACT, Question, dense
 from nichechain.evolvability.record import draw_children, own_strength
 from nichechain.niches import Niches
@@ -190,7 +190,9 @@ def compare(
         walks = simulate_lineages(matrix, begin.reshape(-1, size), generations, rng)
         simulated.append(niches_reached(walks, n).reshape(_REPLICAS, 2 * roots, generations))
         if chain.states <= MOST_EXACT:
-            values.append(coverage_so_far(matrix, first, generations, size, n))
+            none = np.zeros(len(first), np.int64)
+            found = coverage_by_generation(matrix, none, generations, [size], n, first=first)
+            values.append(found[:, :, 0])
         else:
             # The error of so many replicas is small beside that of the lineages really run.
             values.append(simulated[-1].mean(axis=0))

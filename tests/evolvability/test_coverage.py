@@ -307,3 +307,12 @@ def test_lengths_are_refused(generations, lineages, message):
 def test_simulation_refuses(generations, lineages, repeats, message):
     with pytest.raises(NichechainError, match=message):
         sampled_coverage(np.eye(2), np.eye(2)[0], generations, lineages, repeats, np.random.default_rng(0))
+
+
+def test_a_billion_generations_end_when_nothing_changes_any_more():
+    # From 0, one step in four leads to 1, and one in four to 2: each is hit first half of the time.
+    T = np.array([[0.5, 0.25, 0.25], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
+    found = expected_coverage(T, T[[0]], 10**9, [1, 10])
+    stays = 0.5  # P(a child stays in 0)
+    assert found[0, 0] == pytest.approx(1.0 + stays, rel=1e-13)
+    np.testing.assert_allclose(found[0, 1], (1 - stays**10) + 2 * (1 - 0.5**10), rtol=1e-13)

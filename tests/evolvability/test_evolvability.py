@@ -515,3 +515,14 @@ def test_offspring_that_all_fail_are_said(plane_chain):
     elite.genotype = np.array([-5.0, 1.0], np.float32)
     with pytest.raises(NichechainError, match="all 30 offspring failed, the first with: below zero"):
         fresh(archive, elite)
+
+
+def test_what_could_take_over_ten_minutes_is_said_before(monkeypatch):
+    from nichechain.evolvability import question
+
+    chain = NicheChain(np.full((3, 3), 1 / 3))
+    monkeypatch.setattr(question, "_LONG", 1e-9)
+    with pytest.warns(UserWarning, match=r"could take \d+ minutes: ask for fewer roots"):
+        l_evolvability(chain, niche=0)
+    with pytest.warns(UserWarning, match="could take"):
+        niche_evolvability(chain, method="monte-carlo", repeats=2)

@@ -8,7 +8,7 @@ import pytest
 from nichechain import GridNiches, TransitionCounts, estimate
 from nichechain.core.randomness import Purpose, keyed
 from nichechain.evolvability import question as asked
-from nichechain.evolvability.coverage import coverage_so_far, expected_coverage
+from nichechain.evolvability.coverage import expected_coverage
 from nichechain.evolvability.level import level
 from nichechain.evolvability.question import Question
 
@@ -38,11 +38,3 @@ def test_lineages_give_the_same_level_on_average(posterior, monkeypatch):
     drawn = [level(posterior, roots, question, [8, 1]) for question in questions]
     error = np.sqrt((np.var(exact, axis=0) + np.var(drawn, axis=0)) / 200)
     assert (np.abs(np.mean(exact, axis=0) - np.mean(drawn, axis=0)) < 4.5 * error).all()
-
-
-def test_coverage_so_far_is_that_of_every_length(posterior):
-    T = posterior.draw(np.random.default_rng(2))
-    first = T[np.array([3, 12])]
-    found = coverage_so_far(T, first, 4, 6, 25)
-    expected = np.stack([expected_coverage(T, first, k + 1, 6, counted=25) for k in range(4)], axis=1)
-    np.testing.assert_allclose(found, expected, rtol=1e-12)
