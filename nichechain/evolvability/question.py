@@ -165,7 +165,8 @@ class Question:
             cost = 2.0 * products * entries * chain.n_niches / _SUMS_A_SECOND
         if cost > _LONG:
             warnings.warn(
-                f"this could take {cost / 60:.0f} minutes: fewer roots, lineages, draws, or a smaller l, take less",
+                f"this could take {cost / 60:.0f} minutes: "
+                "fewer roots, lineages, generations or draws take less",
                 stacklevel=3,
             )
 
