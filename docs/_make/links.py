@@ -4,24 +4,22 @@ from __future__ import annotations
 
 import posixpath
 import re
-from typing import Any
 
 _LINK = re.compile(r"(?<!!)\[([^\]]*)\]\(([^)#:\s]+)(#[^)\s]*)?\)")
 _EXAMPLE = re.compile(r"examples/(\d\d_\w+)\.py")
 
 
-def on_page_markdown(markdown: str, *, page: Any, **_: Any) -> str:
-    """Rewrite links that leave the folder of the documentation."""
-    here = posixpath.dirname(page.file.src_uri)
+def rewrite(markdown: str, here: str) -> str:
+    """Rewrite links that leave the folder of the documentation, in a page of the folder ``here``."""
 
-    def rewrite(found: re.Match[str]) -> str:
+    def follow(found: re.Match[str]) -> str:
         text, target = found.group(1), found.group(2)
         path = posixpath.normpath(posixpath.join("docs", here, target))
         if path.startswith("docs/"):
             return found.group(0)
         example = _EXAMPLE.fullmatch(path)
         if example:
-            return f"[{text}]({posixpath.relpath(f'examples/{example.group(1)}.md', here or '.')})"
+            return f"[{text}]({posixpath.relpath(f'examples/{example.group(1)}.md', here)})"
         return text if "`" in text else f"`{path}`"
 
-    return _LINK.sub(rewrite, markdown)
+    return _LINK.sub(follow, markdown)

@@ -14,21 +14,14 @@ import sys
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-from mkdocs.config.defaults import MkDocsConfig
-from mkdocs.structure.files import File, Files
-
 # The command line has a page of its own, and shipped archives are no room.
 _NOT_PYTHON = ("cli", "archives")
 _SUBCOMMAND = re.compile(r"^  ([a-z]+) [A-Z]+ ", re.MULTILINE)
 
 
-def on_files(files: Files, *, config: MkDocsConfig) -> Files:
-    """Add the generated pages."""
-    root = Path(config.config_file_path).parent
-    pages = {"cli.md": command_line()} | examples(root) | reference(root / "nichechain")
-    for name, content in pages.items():
-        files.append(File.generated(config, name, content=content))
-    return files
+def pages(root: Path) -> dict[str, str]:
+    """All of them, by their paths in the documentation."""
+    return {"cli.md": command_line()} | examples(root) | reference(root / "nichechain")
 
 
 def command_line() -> str:
@@ -53,7 +46,7 @@ def command_line() -> str:
 
 def examples(root: Path) -> dict[str, str]:
     """One page for each numbered example, and one that lists them."""
-    pages = {}
+    made = {}
     listed = []
     for path in sorted(root.glob("examples/[0-9][0-9]_*.py")):
         source = path.read_text(encoding="utf-8")
@@ -65,19 +58,19 @@ def examples(root: Path) -> dict[str, str]:
         if (root / "docs/pictures/examples" / f"{path.stem}.png").is_file():
             parts.append(f"![what {path.name} draws](../pictures/examples/{path.stem}.png)")
         parts += [f"```sh\npython examples/{path.name}\n```", f"```python\n{body}\n```"]
-        pages[name] = "\n\n".join(parts)
+        made[name] = "\n\n".join(parts)
         listed.append(f"| [`{path.name}`]({path.stem}.md) | {heading} |")
     table = "\n".join(["| script | what it does |", "|---|---|", *listed])
-    pages["examples/index.md"] = (
+    made["examples/index.md"] = (
         "# Examples\n\nNumbered scripts, each under a minute and each ending in a picture. "
         f"They run anywhere and write to the current folder.\n\n{table}\n"
     )
-    return pages
+    return made
 
 
 def reference(package: Path) -> dict[str, str]:
     """One page for each room, of what its packages have for users, and one of what comes in one import."""
-    pages = {"api/nichechain.md": _front(_exported(package / "__init__.py"))}
+    made = {"api/nichechain.md": _front(_exported(package / "__init__.py"))}
     for room in sorted(path.parent for path in package.glob("*/__init__.py")):
         if room.name not in _NOT_PYTHON:
             packages = sorted(room.rglob("__init__.py"), key=lambda path: (len(path.parts), path))
@@ -87,8 +80,8 @@ def reference(package: Path) -> dict[str, str]:
                 names = [name for name in _exported(path) if name not in seen]
                 seen.update(names)
                 parts += _package(package.parent, path.parent, names) if names else []
-            pages[f"api/{room.name}.md"] = "\n\n".join([f"# nichechain.{room.name}", *parts])
-    return pages
+            made[f"api/{room.name}.md"] = "\n\n".join([f"# nichechain.{room.name}", *parts])
+    return made
 
 
 def _package(root: Path, folder: Path, exported: list[str]) -> list[str]:

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import html
 import re
-from typing import Any
 
 from latex2mathml.converter import convert
 
 _EQUATION = re.compile(r'<(span|div) class="arithmatex">(.*?)</\1>', re.DOTALL)
 
 
-def on_page_content(content: str, **_: Any) -> str:
+def to_mathml(page: str) -> str:
     r"""Convert what arithmatex leaves: \(...\) in a line, \[...\] on lines of its own."""
-    return _EQUATION.sub(_mathml, content)
+    return _EQUATION.sub(_mathml, page)
 
 
 def _mathml(found: re.Match[str]) -> str:
