@@ -5,7 +5,12 @@ rounds evaluate the same Fetch genotypes. Wall time is used, so leave the machin
 other work may share it, the share of processor time is printed too. Without Ray installed, its
 line is left out.
 
-    python benchmarks/overhead.py --repeats 5
+    python benchmarks/overhead.py [building] [executors] [driver] [feeding] [disk] --repeats 5
+
+Without a name it is all of them. ``feeding`` builds with workers that sleep as long as a Fetch
+rollout takes, so that few processors do: on 200 threads, and, each sleeping less, on fewer processes
+and on a local Ray cluster of two nodes. It tells what the driver spends on a birth while workers wait
+for it (its own cost), and while they do not (sending and receiving).
 """
 
 from __future__ import annotations
@@ -17,7 +22,9 @@ import os
 import statistics
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, nullcontext
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -32,6 +39,12 @@ from nichechain.domains import Evaluation, FetchPickAndPlace, PlanarArm
 from nichechain.domains.base import Domain
 from nichechain.execution import Executor, Threads, available_cpus
 from nichechain.search.config import BuildConfig
+from nichechain.variation.brood import Brood, litters
+
+LATENCY = 1 / 35
+"""Seconds of a Fetch rollout."""
+PROCESSORS = 200
+"""How many processors sleeping workers stand for."""
 
 
 class TimedFetch(FetchPickAndPlace):
@@ -50,19 +63,24 @@ class TimedFetch(FetchPickAndPlace):
 
 
 class Stopwatch:
-    """An executor that adds up the time that passes in it."""
+    """An executor that adds up the time that passes in it: on the wall, of the thread, of the process."""
 
     def __init__(self, inner: Executor) -> None:
         self._inner = inner
-        self.wall = 0.0
+        self.wall = self.thread = self.process = 0.0
 
     def evaluate(
-        self, domain: Domain, genotypes: NDArray[np.float32], on_done: Callable[[int], None] | None = None
+        self,
+        domain: Domain,
+        genotypes: NDArray[np.float32] | Brood,
+        on_done: Callable[[int], None] | None = None,
     ) -> Evaluation:
         """Evaluate, and note how long it took."""
-        started = time.perf_counter()
+        wall, thread, process = time.perf_counter(), time.thread_time(), time.process_time()
         evaluation = self._inner.evaluate(domain, genotypes, on_done)
-        self.wall += time.perf_counter() - started
+        self.wall += time.perf_counter() - wall
+        self.thread += time.thread_time() - thread
+        self.process += time.process_time() - process
         return evaluation
 
 
@@ -75,20 +93,43 @@ class Scattered(PlanarArm):
         super().__init__(1952)
 
 
+class Sleeper(Scattered):
+    """A domain that takes time, and no processor."""
+
+    def __init__(self, latency: float) -> None:
+        super().__init__()
+        self.latency = latency
+
+    def evaluate(self, genotypes: ArrayLike) -> Evaluation:
+        """Sleep; behavior is a function of two weights."""
+        rows = np.asarray(genotypes)
+        time.sleep(self.latency * len(rows))
+        behavior = np.tanh(rows[:, :2].astype(np.float64) / 10.0)
+        return Evaluation(behavior, behavior[:, 0].copy(), np.zeros(len(rows), bool), ("",) * len(rows))
+
+
 def main() -> None:
-    """Measure all of it."""
+    """Measure what is asked for, or all of it."""
+    parts: dict[str, Callable[[argparse.Namespace], None]] = {
+        "building": building,
+        "executors": executors,
+        "driver": driver,
+        "feeding": feeding,
+        "disk": disk,
+    }
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("part", nargs="*", choices=[*parts, []], help="all by default")
     parser.add_argument("--repeats", type=int, default=5)
     parser.add_argument("--batch", type=int, default=256, help="genotypes of a round")
     parser.add_argument("--births", type=int, default=1000, help="of a measured build")
+    parser.add_argument("--sleepers", type=int, default=8, help="processes, and Ray actors, that sleep")
+    parser.add_argument("--feeding", type=int, default=38_400, help="births that sleeping workers evaluate")
     options = parser.parse_args()
     cpus = available_cpus()
     load = os.getloadavg()[0]
     print(f"{cpus} processors, load {load:.1f} before we begin, {options.repeats} repeats, medians (range)")
-    building(options)
-    executors(options)
-    driver(options)
-    disk()
+    for name in options.part or parts:
+        parts[name](options)
 
 
 def building(options: argparse.Namespace) -> None:
@@ -169,21 +210,73 @@ def driver(options: argparse.Namespace) -> None:
                     costs.append(1e6 * (time.thread_time() - began) / births)
             print(f"  a birth, {label}, batch {batch}: {_range(costs)}")
     scattered = Scattered()
-    rows = scattered.sample(500, seed=0)
+    children = litters(variation.cauchy(), Purpose.MUTATION, scattered.sample(125, seed=0), 0, 4)
     for spec in ("processes:1", "ray") if importlib.util.find_spec("ray") else ("processes:1",):
         with execution.make(spec) as executor:
-            executor.evaluate(scattered, rows)
+            executor.evaluate(scattered, children)
             costs = []
             pieces: list[int] = []
             for _ in range(options.repeats):
                 pieces.clear()
                 began = time.process_time()
-                executor.evaluate(scattered, rows, pieces.append)
+                executor.evaluate(scattered, children, pieces.append)
                 costs.append(1e6 * (time.process_time() - began) / len(pieces))
         print(f"  a piece sent and received, {spec}: {_range(costs)}")
 
 
-def disk() -> None:
+def feeding(options: argparse.Namespace) -> None:
+    """What a driver spends on a birth, fed by sleeping workers at the rate of many processors."""
+    births, batch = options.feeding, 6400
+    print(f"a search of {births} births, its workers as fast as {PROCESSORS} processors at rollouts:")
+    specs = [f"threads:{PROCESSORS}", f"processes:{options.sleepers}"]
+    if importlib.util.find_spec("ray"):
+        specs.append("ray")
+    for spec in specs:
+        workers = options.sleepers if spec == "ray" else int(spec.partition(":")[2])
+        domain = Sleeper(workers / PROCESSORS * LATENCY)
+        config = BuildConfig("arm", (20, 20), ((-1, 1), (-1, 1)), evaluations=births, batch=batch)
+        own, sending, busy = [], [], []
+        with two_nodes(workers) if spec == "ray" else nullcontext(), execution.make(spec) as executor:
+            executor.evaluate(domain, domain.sample(64 * workers, seed=0))
+            # The first build, of the initial births, loads what pyribs compiles.
+            for first in (True, *[False] * options.repeats):
+                watch = Stopwatch(executor)
+                with tempfile.TemporaryDirectory() as folder:
+                    began, used = time.perf_counter(), time.thread_time()
+                    build(replace(config, evaluations=300) if first else config, folder, watch, domain=domain)
+                    took, used = time.perf_counter() - began, time.thread_time() - used
+                if not first:
+                    own.append(1e6 * (used - watch.thread) / births)
+                    # Threads do their own growing in this process, so of them it is the caller's alone.
+                    sending.append(
+                        1e6 * (watch.thread if spec.startswith("threads") else watch.process) / births
+                    )
+                    busy.append(100 * LATENCY * births / (PROCESSORS * took))
+        print(f"  {spec}, {workers} workers that sleep {1e3 * domain.latency:.2f} ms a birth:")
+        print(f"    the driver's own, a birth:   {_range(own)} microseconds of processor time (target: < 15)")
+        print(f"    sending and receiving:       {_range(sending)} microseconds a birth, while workers sleep")
+        print(f"    workers asleep:              {_range(busy)} % of the wall time")
+
+
+@contextmanager
+def two_nodes(workers: int) -> Iterator[None]:
+    """A Ray cluster of two nodes on this machine, with so many processors in all, as it believes."""
+    os.environ["RAY_USAGE_STATS_ENABLED"] = "0"
+    import ray
+    from ray.cluster_utils import Cluster
+
+    node = {"num_cpus": workers // 2, "object_store_memory": 2**27}
+    cluster = Cluster(initialize_head=True, head_node_args={**node, "include_dashboard": False})
+    try:
+        cluster.add_node(**node)
+        ray.init(address=cluster.address, logging_level="ERROR", log_to_driver=False)
+        yield
+    finally:
+        ray.shutdown()
+        cluster.shutdown()
+
+
+def disk(options: argparse.Namespace) -> None:  # noqa: ARG001  # the archive that ships, once
     """The shipped archive: bytes, commit, counting and adding."""
     archive = nc.load("fetch-pick-and-place")
     folder, meta = archive.folder, archive.meta

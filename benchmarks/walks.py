@@ -23,6 +23,7 @@ from nichechain import domains, variation
 from nichechain.domains.base import Domain, Evaluation
 from nichechain.execution import Threads, available_cpus
 from nichechain.niches import GridNiches
+from nichechain.variation.brood import Brood
 from nichechain.walks import Selective, TopFraction, Uniform, WalkConfig, Walks, diversity, walk
 from nichechain.walks.diversity import metrics
 
@@ -39,7 +40,7 @@ class Stopwatch:
     def evaluate(
         self,
         domain: Domain,
-        genotypes: NDArray[np.float32],
+        genotypes: NDArray[np.float32] | Brood,
         on_done: Callable[[int], None] | None = None,
     ) -> Evaluation:
         """Evaluate, or give what was evaluated before."""

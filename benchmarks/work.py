@@ -35,6 +35,7 @@ from nichechain.search.config import BuildConfig
 from nichechain.studies.conditions import Condition
 from nichechain.studies.running import run as walk_study
 from nichechain.studies.study import Study, pressure_conditions
+from nichechain.variation.brood import Brood, grown
 
 THREADS = 2
 GRID, BOUNDS = (20, 20), FetchPickAndPlace.bounds
@@ -61,24 +62,26 @@ class Compared:
     def evaluate(
         self,
         domain: Domain,  # noqa: ARG002  # the executor's own, with and without the cache
-        genotypes: NDArray[np.float32],
+        genotypes: NDArray[np.float32] | Brood,
         on_done: Callable[[int], None] | None = None,
     ) -> Evaluation:
         """The rows, from the engine with the cache."""
-        found = {way: self._timed(way, self._threads.evaluate, d, genotypes) for way, d in self._ways.items()}
+        # Grown here, so that times are of rollouts alone.
+        rows = grown(genotypes)
+        found = {way: self._timed(way, self._threads.evaluate, d, rows) for way, d in self._ways.items()}
         if self._envpool:
-            self._timed("envpool", envpool_task(genotypes, THREADS))
+            self._timed("envpool", envpool_task(rows, THREADS))
         plain, cached = found["plain"], found["cached"]
         if plain.behavior.tobytes() != cached.behavior.tobytes() or plain.reasons != cached.reasons:
             raise RuntimeError("the cache changed a result")
         self._steps += cached.steps
         self._known += cached.known
-        self._rollouts += len(genotypes)
+        self._rollouts += len(rows)
         if time.monotonic() - self._told > _EVERY:
             self._told = time.monotonic()
             self.tell()
         if on_done is not None:
-            on_done(len(genotypes))
+            on_done(len(rows))
         return cached
 
     def _timed(self, way: str, task: Callable[..., Evaluation], *arguments: object) -> Evaluation:

@@ -122,7 +122,9 @@ def check_seed(seed: object) -> None:
     NichechainError
         If it is no whole number, or a negative one.
     """
-    check_at_least(0, seed=seed)
+    # First what is nearly always so: every child has a generator.
+    if type(seed) is not int or seed < 0:
+        check_at_least(0, seed=seed)
 
 
 def rng_of(seed: int | np.random.Generator) -> np.random.Generator:

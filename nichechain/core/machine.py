@@ -47,6 +47,12 @@ def _machine() -> dict[str, str]:
 
 def library_versions() -> dict[str, str]:
     """Versions of the libraries whose numbers end up in an archive."""
+    return dict(_versions())
+
+
+# Every commit of a build says them, and to find them takes as long as to mutate a thousand children.
+@cache
+def _versions() -> dict[str, str]:
     found = {"nichechain": __version__, "python": platform.python_version()}
     for name in ("numpy", "numba", "torch", "mujoco", "gymnasium", "gymnasium-robotics", "ribs"):
         try:
