@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from typing import Any
 
@@ -32,6 +33,8 @@ from nichechain.search.savings import Savings
 from nichechain.search.selection import ParentSelection, Told, UniformParents, draw_parents
 from nichechain.variation import Mutation
 from nichechain.variation.brood import Brood
+
+Ints = NDArray[np.int64]
 
 _NUMBERS = itertools.count()
 
@@ -148,7 +151,14 @@ class MapElites:
             step = self.step + 1
             waiting = self._initial() if step == 0 else self._children(step)
         offspring = waiting[:limit]
-        evaluation = executor.evaluate(self._domain, offspring.genotype, on_done)
+        slot = np.full(len(offspring), NONE, np.int64)
+        if step:
+            slot = self._stretch.slots(step)[0][offspring.uid - self._first_uid(step)]
+        # Lineages will go on from their births, so those are grown here while all are evaluated.
+        with ThreadPoolExecutor(1) as aside:
+            growing = aside.submit(offspring[slot != NONE].grown)
+            evaluation = executor.evaluate(self._domain, offspring.genotype, on_done)
+            of_lineages = growing.result()
         # Nothing of the search changes before the evaluation is there, so an interrupted one
         # leaves the last state whole.
         self.settled = False
@@ -156,7 +166,7 @@ class MapElites:
         self.step = step
         self.births += len(offspring)
         self.savings = self.savings.and_of(evaluation)
-        rows = self._keep(offspring, evaluation)
+        rows = self._keep(offspring, evaluation, slot, of_lineages)
         self.settled = True
         return rows
 
@@ -218,7 +228,10 @@ class MapElites:
     def _first_uid(self, step: int) -> int:
         return 0 if step == 0 else self._stretch.uid(step)
 
-    def _keep(self, offspring: Offspring, evaluation: Evaluation) -> pa.Table:
+    def _keep(
+        self, offspring: Offspring, evaluation: Evaluation, slot: Ints, of_lineages: NDArray[np.float32]
+    ) -> pa.Table:
+        """The births of a step, of which those with a slot are of lineages and have a genotype each."""
         fine = ~evaluation.failed
         niche = np.full(len(offspring), NONE, np.int64)
         niche[fine] = self._niches.of(evaluation.behavior[fine])
@@ -239,23 +252,22 @@ class MapElites:
                 offspring.depth[winners],
             )
         )
-        self._lineages = self._gone_on(offspring, niche)
+        self._lineages = self._gone_on(offspring, niche, slot, of_lineages)
         step = np.full(len(offspring), self.step)
         self._selection.tell(Told(offspring.parent_uid, offspring.parent_niche, niche, accepted, step))
         return births.make_table(offspring, evaluation, child_niche=niche, accepted=accepted, step=self.step)
 
-    def _gone_on(self, offspring: Offspring, niche: NDArray[np.int64]) -> UnderWay:
-        """The lineages after some births of a step."""
-        if self.step == 0:
-            return self._lineages
-        slot = self._stretch.slots(self.step)[0][offspring.uid - self._first_uid(self.step)]
+    def _gone_on(
+        self, offspring: Offspring, niche: Ints, slot: Ints, of_lineages: NDArray[np.float32]
+    ) -> UnderWay:
+        """The lineages after some births of a step, see :meth:`_keep`."""
         can = niche != NONE
         if self._niches.outside == "absorb":
             can &= niche < len(self._niches)
         ours, ended = (slot != NONE) & can, (slot != NONE) & ~can
         births = UnderWay(
             slot[ours],
-            offspring[ours].grown(),
+            of_lineages[can[slot != NONE]],
             offspring.uid[ours],
             niche[ours],
             offspring.depth[ours],
