@@ -2,7 +2,8 @@
 
 A lineage begins with the child of an elite, which is a birth like any, and goes on with births that the
 column ``lineage`` flags. Lineages of one elite are a brood. A table of lineages has rows (brood, lineage,
-generation, parent state, child state), (L, 5) int64: generation 1 is the elite's child.
+generation, parent state, child state, begun), (L, 6) int64: generation 1 is the elite's child, and begun the
+number that the first birth of the brood has in its run.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from nichechain.births.table import NONE
 
 Ints = NDArray[np.int64]
 
-COLUMNS = 5
+COLUMNS = 6
 """Of a table of lineages."""
 
 
@@ -27,7 +28,7 @@ def no_lineages() -> Ints:
 def lineages_of(
     run: Ints, uid: Ints, parent_uid: Ints, parent: Ints, child: Ints, flagged: NDArray[np.bool_]
 ) -> Ints:
-    """The table of lineages of some births, sorted, (L, 5).
+    """The table of lineages of some births, sorted, (L, 6).
 
     Parameters
     ----------
@@ -70,5 +71,8 @@ def lineages_of(
     rows, ancestor, generation = rows[kept], ancestor[kept], generation[kept]
     _, brood = np.unique(elder[ancestor], return_inverse=True)
     _, lineage = np.unique(ancestor, return_inverse=True)
-    table = np.stack([brood, lineage, generation, parent[rows], child[rows]], axis=1).astype(np.int64)
+    begun = np.full(brood.max(initial=-1) + 1, np.iinfo(np.int64).max)
+    np.minimum.at(begun, brood, uid[ancestor])
+    columns = brood, lineage, generation, parent[rows], child[rows], begun[brood]
+    table = np.stack(columns, axis=1).astype(np.int64)
     return table[np.lexsort(table.T[2::-1])]

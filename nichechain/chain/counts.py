@@ -46,7 +46,7 @@ class TransitionCounts:
     families : (F, 4) int64 array
         Rows (state, elite, child state, children): whose children they are, as far as births say.
         Numbers of elites matter only in that they differ.
-    lineages : (L, 5) int64 array
+    lineages : (L, 6) int64 array
         Births of unselected lineages, see :mod:`nichechain.births.lineages`. Those after the first of
         each are not in ``matrix``, since a search hardly ever makes such a birth a parent.
     """

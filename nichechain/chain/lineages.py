@@ -37,6 +37,8 @@ _FINE = 181
 # A brood's number of niches is never known better than to a tenth, few broods tell their spread badly.
 _LEAST_SPREAD = 0.1
 _REPEATS = 40
+# Elites change over a search, and those that are left are asked about: broods of the later half, or so many.
+_FEWEST = 10
 # Broods that speak for elites that differ as rows do, and the least standard deviation of whole numbers.
 _IMAGINARY = 5.0
 _LEAST_DEVIATION = 0.5
@@ -118,17 +120,18 @@ def fitted_law(posterior: DirichletPosterior) -> LineageLaw | None:
     Notes
     -----
     b maximises the likelihood of which births of lineages stay. τ makes simulated broods, each with as many
-    lineages of the same lengths, reach as many niches as the real ones on average; a normal distribution
+    lineages of the same lengths, reach as many niches as the real ones on average. Broods begun in the
+    earlier half of the time are left out, if ten are left. A normal distribution
     of log τ around log 20, two wide, stands for what is thought of it before. A likelihood of single
     steps would see little of τ: what elites differ in is how far their lineages overlap. How many niches
     broods reach differs by more than simulated ones do, where elites differ in more than rows drawn
     independently. That ratio is the root mean square of real broods' distances from simulated ones, in
     standard deviations of these; five imaginary broods speak for a ratio of 1.
     """
-    table = posterior.counts.lineages
+    table = _latest(posterior.counts.lineages)
     if not len(table):
         return None
-    stay, error = _stay(posterior)
+    stay, error = _stay(posterior, table)
     broods = _Broods(table, len(posterior.counts.niches))
     rows = UrnRows.of(posterior)
     first = rows.scattered(posterior.elite_concentration)
@@ -167,9 +170,17 @@ def scattered_rows(rows: Floats, concentration: float, rng: np.random.Generator)
     return _redrawn(rows, concentration, rng)
 
 
-def _stay(posterior: DirichletPosterior) -> tuple[float, float]:
-    """B and its standard error."""
-    table = posterior.counts.lineages
+def _latest(table: Ints) -> Ints:
+    """Rows of the broods begun in the later half of the time, and of the last few at least."""
+    if not len(table):
+        return table
+    newest = np.sort(np.unique(table[:, [5, 0]], axis=0)[:, 0])[::-1]
+    kept: Ints = table[table[:, 5] >= min(newest[0] // 2, newest[:_FEWEST][-1])]
+    return kept
+
+
+def _stay(posterior: DirichletPosterior, table: Ints) -> tuple[float, float]:
+    """The logarithm of the factor on odds of staying, and its standard error."""
     later = table[table[:, 2] > 1]
     if posterior.absorbing:
         later = later[later[:, 3] < posterior.counts.niches.states - 1]

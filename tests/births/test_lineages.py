@@ -11,7 +11,13 @@ STATE = np.array([5, 6, 10, 11, 12, 13, 14, 15, -1, 17])
 STOOD = np.array([-1, -1, 5, 5, 6, 10, 11, 13, 14, 6])
 FLAGGED = np.array([0, 0, 0, 0, 0, 1, 1, 1, 1, 0], bool)
 RUN = np.zeros(10, np.int64)
-EXPECTED = [[0, 0, 1, 5, 10], [0, 0, 2, 10, 13], [0, 0, 3, 13, 15], [0, 1, 1, 5, 11], [0, 1, 2, 11, 14]]
+EXPECTED = [
+    [0, 0, 1, 5, 10, 2],
+    [0, 0, 2, 10, 13, 2],
+    [0, 0, 3, 13, 15, 2],
+    [0, 1, 1, 5, 11, 2],
+    [0, 1, 2, 11, 14, 2],
+]
 
 
 def table(*arrays):
@@ -39,9 +45,9 @@ def test_runs_are_kept_apart():
 def test_a_lineage_whose_beginning_is_missing_is_left_out():
     kept = UID != 2
     found = table(*(array[kept] for array in (RUN, UID, PARENT, STOOD, STATE, FLAGGED)))
-    assert found == [[0, 0, *row[2:]] for row in EXPECTED[3:]]
+    assert found == [[0, 0, *row[2:5], 3] for row in EXPECTED[3:]]
 
 
 def test_births_without_lineages_have_an_empty_table():
     plain = np.zeros(10, bool)
-    assert lineages_of(RUN, UID, PARENT, STOOD, STATE, plain).shape == no_lineages().shape == (0, 5)
+    assert lineages_of(RUN, UID, PARENT, STOOD, STATE, plain).shape == no_lineages().shape == (0, 6)

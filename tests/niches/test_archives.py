@@ -196,7 +196,9 @@ def test_births_of_another_program_are_imported_into_a_tessellation(archives, tm
     import_births(tmp_path / "log.csv", tmp_path / "archive", niches, columns=columns)
     imported = nc.load(tmp_path / "archive")
     assert imported.niches == niches
-    assert (imported.counts.matrix != archives["cvt"].counts.matrix).nnz == 0
+    # A log without the column has no births of lineages.
+    own = archives["cvt"].counts + archives["cvt"].counts_of(lineages=True)
+    assert (imported.counts.matrix != own.matrix).nnz == 0
 
 
 def test_a_build_on_the_command_line(tmp_path, capsys):
@@ -210,5 +212,4 @@ def test_a_build_on_the_command_line(tmp_path, capsys):
     assert "--grid 8x8 and --niches cvt:30 exclude each other" in capsys.readouterr().err
     assert main([*asked[:-1], "cvt:none", "--force"]) == 2
     assert "niches is 'cvt:none'" in capsys.readouterr().err
-    assert main(["explore", str(tmp_path / "a"), "--out", str(tmp_path / "page.html")]) == 2
-    assert "tessellation, but the page shows a grid" in capsys.readouterr().err
+    assert main(["explore", str(tmp_path / "a"), "--out", str(tmp_path / "page.html")]) == 0
