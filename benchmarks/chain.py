@@ -1,12 +1,15 @@
 """What the chain costs beside the general Markov libraries, and what it costs as it grows.
 
     python benchmarks/chain.py [--largest 10000]
+    python benchmarks/chain.py --commands FOLDER [--sizes 20,50,100]
 
 Prints, from one run, each figure beside its target:
 - Monte Carlo walks against QuantEcon's compiled simulator and deeptime's, where they are installed;
 - l-evolvability in closed form, of all niches and of one, on chains of random transitions and on
   chains whose transitions lead to neighbours, with the memory it takes;
-- the default estimator: its fit, and what a posterior draw costs beside a sparse T that is given.
+- the default estimator: its fit, and what a posterior draw costs beside a sparse T that is given;
+- or, with ``--commands``, whole commands from the shell on grids of 400, 2,500 and 10,000 niches: processor
+  time, time and memory. Archives of the arm are built in the folder where they are missing.
 
 Times are the best of a few, because other programs slow the rest.
 """
@@ -14,9 +17,13 @@ Times are the best of a few, because other programs slow the rest.
 from __future__ import annotations
 
 import argparse
+import os
+import subprocess
+import sys
 import time
 import tracemalloc
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,12 +38,30 @@ from nichechain.niches import GridNiches
 
 NONZEROS = 17
 
+# Births on a grid of so many cells along each axis, and the seconds that its commands may take.
+BIRTHS = {20: 8_000, 50: 20_000, 100: 1_000_000}
+COMMANDS: tuple[tuple[str, dict[int, float]], ...] = (
+    ("evolvability {a} --top 5", {20: 2.0, 50: 5.0, 100: 60.0}),
+    ("evolvability {a} --niche {middle}", {20: 2.0, 50: 2.0, 100: 6.0}),
+    ("evolvability {a} --elite {middle}", {20: 2.0, 50: 5.0, 100: 60.0}),
+    ("compare {a} {b}", {20: 20.0, 50: 60.0}),
+    ("estimate {a} --stability", {20: 20.0, 50: 60.0}),
+    ("sweep {a}", {20: 20.0, 50: 60.0}),
+    ("validate {a} --elites 3 --lineages 2 --workers 1 --out {out}", {20: 20.0, 50: 60.0}),
+    ("explore {a} --out {out}.html", {20: 10.0, 50: 10.0}),
+)
+
 
 def main() -> None:
     """Run all."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--largest", type=int, default=10_000, help="niches of the largest chain")
+    parser.add_argument("--commands", type=Path, help="whole commands, on archives in this folder")
+    parser.add_argument("--sizes", default="20,50,100", help="for --commands: cells along each axis")
     options = parser.parse_args()
+    if options.commands is not None:
+        commands(options.commands, [int(size) for size in options.sizes.split(",")])
+        return
     monte_carlo()
     exact(options.largest)
     estimator()
@@ -148,6 +173,44 @@ def large_estimate(cells: int = 100, births: int = 200_000) -> None:
     print(f"  {milliseconds(best(run, 1))}; strength {strengths[0]:.3g}")
     peak = memory(run)
     verdict(f"  memory {peak / 1e6:7.1f} MB", "of 1 GB", peak / 1e9)
+
+
+def commands(folder: Path, sizes: list[int]) -> None:
+    """Whole commands from the shell, in a table."""
+    print(f"{'niches':>7} {'births':>8}  {'processor':>10} {'time':>9} {'memory':>9}  command")
+    for size in sizes:
+        a, b = (folder / f"arm-{size}-{seed}" for seed in (1, 2))
+        for seed, archive in enumerate((a, b), start=1):
+            if not (archive / "meta.json").exists() and (archive == a or size in COMMANDS[3][1]):
+                shape = (
+                    f"--grid {size}x{size} --evaluations {BIRTHS[size]} --batch {64 if size < 50 else 4096}"
+                )
+                measured(f"build arm {shape} --scale 0.1 --seed {seed} --workers 1 --out {archive}")
+        for line, targets in COMMANDS:
+            if size not in targets:
+                continue
+            middle = f"{size // 2},{size // 2}"
+            processor, whole, peak, status = measured(
+                line.format(a=a, b=b, middle=middle, out=folder / "out")
+            )
+            missed = "" if processor <= targets[size] else f"   MISSED {targets[size]:g} s"
+            print(
+                f"{size * size:7d} {BIRTHS[size]:8d}  {processor:8.1f} s {whole:7.1f} s {peak / 1e6:6.0f} MB"
+                f"  {line.format(a='A', b='B', middle=middle, out='OUT')}"
+                f"{missed}{'' if status == 0 else f'   STATUS {status}'}",
+                flush=True,
+            )
+
+
+def measured(line: str) -> tuple[float, float, float, int]:
+    """Processor time and time in seconds, largest memory in bytes, and status of a command."""
+    began = time.monotonic()
+    command = [sys.executable, "-m", "nichechain", *line.split()]
+    with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
+        _, status, used = os.wait4(process.pid, 0)
+        process.returncode = os.waitstatus_to_exitcode(status)
+    whole = time.monotonic() - began
+    return used.ru_utime + used.ru_stime, whole, used.ru_maxrss * 1024.0, process.returncode
 
 
 def random_chain(states: int, rng: np.random.Generator) -> sparse.csr_array:

@@ -22,10 +22,14 @@ if TYPE_CHECKING:
     from nichechain.domains.base import Domain
 
 _GRID = "20x20"
-# Beyond so many niches, only those of the most births are scored, with few draws.
+# Beyond so many niches, only those of the most births are scored; beyond few, with few draws.
 _MANY_NICHES = 1000
 _SCORED = 200
-_FEW_DRAWS = 20
+_FEW_NICHES, _FEW_DRAWS = 500, 20
+# Where a first look would take about so many seconds, another command is named instead. What a pair of
+# niches takes in the fit of T, and a cubed number of niches in a draw.
+_FIRST_LOOK = 2.0
+_PAIR, _CUBE = 1.2e-5, 2.7e-10
 # Births that a niche must have to be ranked.
 _RANKED = 20
 
@@ -272,15 +276,16 @@ def _report(folder: Path, shown: object) -> None:
     assert isinstance(shown, Console)
     archive = load(folder)
     counts = archive.counts
-    chain = archive.chain()
     n = len(archive.niches)
     # A first look, which should keep nobody waiting: only the niches that it may show are scored.
     births_of = counts.births[:n]
     most = np.argsort(-births_of, kind="stable")[: _SCORED if n > _MANY_NICHES else n]
     roots = np.sort(most[births_of[most] >= _RANKED])
-    question = Question(draws=DRAWS if n <= _MANY_NICHES else _FEW_DRAWS)
+    question = Question(draws=DRAWS if n <= _FEW_NICHES else _FEW_DRAWS)
+    seconds = _PAIR * counts.matrix.nnz + (question.draws * _CUBE * n**3 if n <= _MANY_NICHES else 0.0)
     ranking = pd.DataFrame()
-    if roots.size:
+    if roots.size and seconds <= _FIRST_LOOK:
+        chain = archive.chain()
         scores = answer_for_niches(chain, question, roots=roots)
         ranking = scores.ranking(chain, min_births=_RANKED).dropna().head(5)
     failed = archive.meta.births - int(counts.visits.sum())
@@ -304,8 +309,10 @@ def _report(folder: Path, shown: object) -> None:
             f"{scores.convention}, {scores.estimator})"
         )
         shown.print(top)
+    elif roots.size:
+        shown.print(f"\n{roots.size} niches have {_RANKED} births behind their row: evolvability ranks them.")
     else:
-        shown.print("\nNo niche has 20 births behind its row yet: too few to rank.")
+        shown.print(f"\nNo niche has {_RANKED} births behind its row yet: too few to rank.")
     shown.print("Next:")
     best = f" --niche {ranking['index'].iloc[0]}" if len(ranking) else ""
     path = shlex.quote(str(folder))

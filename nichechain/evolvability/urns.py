@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from nichechain.chain.lineages import urns_of
 from nichechain.core.intervals import drawn_interval
 from nichechain.core.randomness import Purpose, keyed
+from nichechain.execution.side_by_side import side_by_side
 
 if TYPE_CHECKING:
     from nichechain.chain.posterior import DirichletPosterior
@@ -27,8 +28,8 @@ Ints = NDArray[np.int64]
 # Lineages of a root are 2 to 40 times as many as are asked for: halves tell the noise, more lower it.
 # Descendants of all roots up to which a draw has more.
 _WORTHWHILE = 200_000
-# Descendants that are kept at once.
-_DESCENDANTS = 4_000_000
+# Descendants that are kept at once, by each thread.
+_DESCENDANTS = 2_000_000
 
 
 @dataclass(frozen=True)
@@ -116,7 +117,8 @@ def simulated_coverage(
     at_once = max(1, _DESCENDANTS // (lineages * (moves + 1)))
     coverage = np.empty((question.draws, m, len(sizes)))
     noise = np.empty_like(coverage)
-    for draw in range(question.draws):
+
+    def simulate(draw: int) -> int:
         rng = keyed(question.seed, Purpose.WALKS, draw)
         urns = urns_of(posterior, keyed(question.seed, Purpose.POSTERIOR, draw))
         for start in range(0, m, at_once):
@@ -130,8 +132,17 @@ def simulated_coverage(
             coverage[draw, block], noise[draw, block] = covered(
                 states[:, 0 if counts_first else lineages :], lineages, sizes, urns.niches
             )
+        return draw
+
+    done = 0
+
+    def count(more: int) -> None:
+        nonlocal done
+        done += more
         if tell is not None:
-            tell(draw + 1)
+            tell(done)
+
+    side_by_side(simulate, range(question.draws), count)
     return Simulated(coverage, noise)
 
 

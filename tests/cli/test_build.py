@@ -160,3 +160,14 @@ def test_meta_says_what_made_it(built):
     assert meta["config"]["domain"] == "arm"
     assert meta["versions"]["numpy"] == np.__version__
     assert meta["versions"]["nichechain"] == nc.__version__
+
+
+def test_a_ranking_that_would_take_long_is_left_to_its_command(tmp_path, capsys, monkeypatch):
+    from nichechain.cli import build
+
+    monkeypatch.setattr(build, "_FIRST_LOOK", 0.0)
+    words = ["build", "arm", "--evaluations", "300", "--grid", "3x3", "--workers", "1"]
+    assert main([*words, "--out", str(tmp_path / "a")]) == 0
+    said = capsys.readouterr().out
+    assert "evolvability ranks them" in said
+    assert "Top niches" not in said
