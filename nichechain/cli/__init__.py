@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import builtins
 import importlib
 import keyword
 import os
 import sys
 from collections.abc import Sequence
+from typing import Any
 
 __all__ = ["COMMANDS", "main"]
 
@@ -14,8 +16,10 @@ COMMANDS = {
     "domains": "what can be searched, with bounds and genotype lengths",
     "build": "fill an archive: MAP-Elites that records who was born where",
     "calibrate": "births of unselected lineages, added to an archive that is there",
+    "list": "the archives that are at hand",
     "info": "what is in an archive, and what made it",
     "evolvability": "l-evolvability of niches, or of an elite",
+    "table": "one row per niche: births, curiosity, l-evolvability, wormholes, dissimila",
     "landscape": "sensitivity, evolvability and dissimila of the elites of an archive",
     "walks": "walks under pressure and with other metrics, tested and reported",
     "study": "searches by several selections of parents, compared and reported",
@@ -70,11 +74,8 @@ def _run(given: Sequence[str]) -> int:
         return _fail(f"there is no command {words[0]!r}: it must be one of {', '.join(COMMANDS)}")
     from nichechain.core.errors import NichechainError
 
-    # A module cannot bear the name of a keyword.
-    name = f"{words[0]}_" if keyword.iskeyword(words[0]) else words[0]
     try:
-        module = importlib.import_module(f"nichechain.cli.{name}")
-        status: int = module.run(words[1:])
+        status: int = module_of(words[0]).run(words[1:])
         sys.stdout.flush()
     except NichechainError as error:
         if debug:
@@ -97,6 +98,13 @@ def _run(given: Sequence[str]) -> int:
             raise
         return _fail(f"{error.strerror or error}: {error.filename}" if error.filename else str(error))
     return status
+
+
+def module_of(command: str) -> Any:
+    """The module of a command."""
+    # Its name cannot be that of a keyword, and within this package it would hide that of a builtin.
+    taken = keyword.iskeyword(command) or hasattr(builtins, command)
+    return importlib.import_module(f"nichechain.cli.{command}{'_' * taken}")
 
 
 def _fail(message: str) -> int:

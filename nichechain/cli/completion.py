@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import importlib
-import keyword
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields, is_dataclass
 from typing import Annotated, Literal, get_args, get_type_hints
 
 import tyro
 
-from nichechain.cli import COMMANDS, parsing
+from nichechain.cli import COMMANDS, module_of, parsing
 
 _BASH = """_nichechain() {{
     local word="${{COMP_WORDS[COMP_CWORD]}}" options
@@ -51,8 +49,7 @@ def run(arguments: Sequence[str]) -> int:
 
 def _words(command: str) -> Iterator[str]:
     """Options of a command, and the studies of ``walks`` with those of all."""
-    name = f"{command}_" if keyword.iskeyword(command) else command
-    module = importlib.import_module(f"nichechain.cli.{name}")
+    module = module_of(command)
     made = [
         value
         for value in vars(module).values()

@@ -14,6 +14,8 @@ DomainOption: TypeAlias = str | int | float | bool
 """What a domain can be told besides its seed."""
 StepBound = Literal["per-coordinate", "rescaled"]
 """How steps of mutation may be bounded."""
+EPSILON = 1e-6
+"""What pyribs adds to a scaled coordinate of a grid before it rounds down, unless told otherwise."""
 
 if TYPE_CHECKING:
     # A configuration is checked without NumPy, which takes its time to import.

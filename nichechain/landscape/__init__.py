@@ -26,9 +26,11 @@ from nichechain.landscape.measures import (
     find_measures,
     measure_behaviors,
 )
+from nichechain.landscape.niche_table import FEWEST_CHILDREN, niche_table
 
 __all__ = [
     "EPSILON",
+    "FEWEST_CHILDREN",
     "MEASURES",
     "OFFSPRING",
     "QUANTILES",
@@ -53,6 +55,7 @@ __all__ = [
     "measure_archive",
     "measure_behaviors",
     "measure_genotypes",
+    "niche_table",
     "niches_of",
     "one_hot_evolvability",
     "population_evolvability",

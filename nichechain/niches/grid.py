@@ -10,12 +10,9 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from nichechain.core.checks import as_bounds, as_shape, check_choice, check_numbers
+from nichechain.core.checks import EPSILON, as_bounds, as_shape, check_choice, check_numbers
 from nichechain.core.errors import NichechainError
 from nichechain.niches.base import MOST_NICHES, OUTSIDE_MODES, Floats, Ints, Niche, Niches, check_bounds
-
-EPSILON = 1e-6
-"""What pyribs adds to a scaled coordinate before it rounds down, unless told otherwise."""
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ from dataclasses import KW_ONLY, MISSING, asdict, dataclass, field, fields
 from typing import Any, Literal, cast, get_args
 
 from nichechain.core.checks import (
+    EPSILON,
     DomainOption,
     StepBound,
     as_bounds,
@@ -19,7 +20,6 @@ from nichechain.core.checks import (
     plain_options,
 )
 from nichechain.core.errors import NichechainError
-from nichechain.niches.grid import EPSILON
 
 Replacement = Literal["random", "first", "newest", "objective"]
 Outside = Literal["state", "absorb", "clip"]

@@ -138,6 +138,9 @@ QUESTIONS: dict[str, tuple[str, ...]] = {
     "evolvability by bootstrap": (
         *("evolvability", "{archive}", *_QUICK, "--uncertainty", "bootstrap", "--repeats", "3"),
     ),
+    "list": ("list", "{out}"),
+    "table": ("table", "{archive}", *_QUICK, "--draws", "3", "--children", "2"),
+    "table by mle": ("table", "{archive}", *_QUICK, "--estimator", "mle", "--format", "csv"),
     "landscape": (
         *("landscape", "{archive}", *_QUICK, "--offspring", "4", "--elites", "3", "--workers", "1"),
         *("--out", "{out}/landscape.csv", "--min-births", "1"),

@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 import dataclasses
-import importlib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -13,7 +12,7 @@ from typing import Any
 import pytest
 
 from nichechain import NichechainError
-from nichechain.cli import COMMANDS, main
+from nichechain.cli import COMMANDS, main, module_of
 
 from .table import World, check_sentence
 
@@ -261,6 +260,7 @@ TABLE: tuple[tuple[str, str, tuple[str, ...], Bad], ...] = (
             **_SCORES,
         },
     ),
+    ("list", "ListCommand", ("{archive}",), {"folder": ("/no/such/folder",), "format": _UNKNOWN}),
     (
         "merge",
         "MergeCommand",
@@ -355,6 +355,21 @@ TABLE: tuple[tuple[str, str, tuple[str, ...], Bad], ...] = (
             "draws": _COUNT,
             "out": ("file.txt", "/no/such/folder/file.png"),
             **_SCORES,
+        },
+    ),
+    (
+        "table",
+        "TableCommand",
+        ("{archive}", "--draws", "2"),
+        {
+            "path": _PATH,
+            "by": _UNKNOWN,
+            "top": _COUNT,
+            "children": ("1", *_COUNT),
+            "draws": _COUNT,
+            "format": _UNKNOWN,
+            **_SCORES,
+            **_ESTIMATOR,
         },
     ),
     (
@@ -464,8 +479,7 @@ def _rows() -> list[Any]:
 
 
 def _dataclass(command: str, kind: str) -> Any:
-    name = command.split()[0]
-    return getattr(importlib.import_module(f"nichechain.cli.{name}{'_' * (name == 'import')}"), kind)
+    return getattr(module_of(command.split()[0]), kind)
 
 
 def _words(command: str, kind: str, given: Sequence[str], option: str, value: str) -> list[str]:
@@ -495,6 +509,7 @@ _POSITIONAL = {
     "completion": ("shell",),
     "domains": (),
     "import": ("log",),
+    "list": ("folder",),
     "merge": ("first", "paths"),
     "plot": ("path", "kind"),
     "study selection": ("domain",),

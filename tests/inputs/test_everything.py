@@ -218,6 +218,7 @@ EXEMPT: dict[tuple[str, str], str] = {
         ("validation.contrast.contrast", "on_done", _WITHIN),
         ("validation.grid_size.sweep", "on_done", _WITHIN),
         ("validation.stability.rank_stability", "on_done", _WITHIN),
+        ("landscape.niche_table.niche_table", "tell", _WITHIN),
         ("search.making.make_niches", "centroids", _WITHIN),
         ("plots.graphs.plot_wormholes", "found", _WITHIN),
         ("evolvability.reach.visit_probability", "first steps", _WITHIN),

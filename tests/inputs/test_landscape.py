@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from .table import (
+    LINEAGES,
     NOT_A_NUMBER,
     RAGGED,
     SEED,
@@ -116,6 +117,17 @@ CALLS = (
         "landscape.measure_archive",
         lambda w: {"archive": w.archive, "offspring": 2, "elites": 2},
         {"offspring": whole(1), "seed": SEED, "elites": whole(0), "share": _SHARE},
+    ),
+    Call(
+        "landscape.niche_table",
+        lambda w: {"archive": w.archive, "l": 1, "lineages": 2, "draws": 2},
+        {
+            **LINEAGES,
+            "estimator": UNKNOWN,
+            "steps": ((3, 1), (-1, 2), (0.5, 2), (1,)),
+            "children": whole(1),
+            "draws": whole(0),
+        },
     ),
     Call(
         "landscape.Landscape.correlations",
