@@ -449,6 +449,7 @@ FREE = {
         (
             "all_births",
             "compare",
+            "drawn",
             "force",
             "fresh_only",
             "json",
