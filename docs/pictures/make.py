@@ -7,12 +7,14 @@ this file; all together it takes about two minutes.
 from __future__ import annotations
 
 import os
+import re
 import runpy
 import sys
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
+import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import PowerNorm
@@ -26,6 +28,9 @@ from nichechain.chain.structure.wormholes import wormholes
 from nichechain.plots.style import EDGE, EMPTY, INK, LONG_JUMP, START, behavior_axes
 from nichechain.walks import diversity
 
+# Twice what a page shows, so that letters stay sharp.
+_DPI = 160
+
 HERE = Path(__file__).resolve().parent
 EXAMPLES = HERE.parents[1] / "examples"
 ROOT = (14, 14)
@@ -36,13 +41,25 @@ CHAIN = ARCHIVE.chain()
 
 def visits(figure: Figure) -> None:
     """Births in every niche."""
-    figure.set_size_inches(6, 7)
+    figure.set_size_inches(5.2, 6)
     plots.plot_visits(ARCHIVE, figure.subplots())
+
+
+def evolvability(figure: Figure) -> None:
+    """l-evolvability of every niche."""
+    figure.set_size_inches(5.2, 6)
+    plots.plot_evolvability(ARCHIVE, nc.niche_evolvability(CHAIN, l=5, lineages=100), figure.subplots())
+
+
+def reachability(figure: Figure) -> None:
+    """Which niches lead to which."""
+    figure.set_size_inches(5.2, 6)
+    plots.plot_reachability(ARCHIVE, CHAIN, figure.subplots(), threshold=0.03)
 
 
 def births(figure: Figure) -> None:
     """Where children of one niche were born."""
-    figure.set_size_inches(6, 7)
+    figure.set_size_inches(5.2, 6)
     ax = figure.subplots()
     behavior_axes(ax, ARCHIVE)
     _cells(ax)
@@ -75,6 +92,8 @@ def rows_of_t(figure: Figure) -> None:
     mesh = None
     for ax, (name, chain) in zip(axes, named.items(), strict=True):
         behavior_axes(ax, ARCHIVE)
+        if ax is not axes[0]:
+            ax.set_ylabel("")
         row = chain.T[[state]]
         row = np.asarray(row.toarray() if hasattr(row, "toarray") else row).ravel()[: len(ARCHIVE.niches)]
         x, y = _edges()
@@ -92,7 +111,7 @@ def rows_of_t(figure: Figure) -> None:
         ax.set_title(f"{name}\n{possible} of 400 niches possible", fontsize="medium")
     assert mesh is not None
     figure.colorbar(mesh, ax=axes, label="probability of a child's niche", shrink=0.8)
-    figure.suptitle(f"The row of niche {CHAIN.label(state)}: 12 births")
+    figure.suptitle(f"The row of niche {CHAIN.label(state)}: 12 births", y=1.02)
 
 
 def transitions(figure: Figure) -> None:
@@ -103,7 +122,7 @@ def transitions(figure: Figure) -> None:
 
 def growth(figure: Figure) -> None:
     """l-evolvability against l and against U."""
-    figure.set_size_inches(12, 4.5)
+    figure.set_size_inches(9.5, 4.2)
     ranking = nc.niche_evolvability(CHAIN, l=5, lineages=100).ranking(CHAIN)["niche"]
     niches = [int(ranking.iloc[place]) for place in (0, len(ranking) // 2, -1)]
     left, right = figure.subplots(1, 2)
@@ -113,13 +132,13 @@ def growth(figure: Figure) -> None:
 
 def wormhole_map(figure: Figure) -> None:
     """Transitions that displacement and destination do not explain."""
-    figure.set_size_inches(6, 7)
+    figure.set_size_inches(5.2, 6)
     plots.plot_wormholes(ARCHIVE, wormholes(CHAIN, beyond="both"), figure.subplots())
 
 
 def local_measures(figure: Figure) -> None:
     """LS and η of one elite, from its recorded children."""
-    figure.set_size_inches(6, 7)
+    figure.set_size_inches(5.2, 6)
     ax = figure.subplots()
     parent, children = _family()
     behavior_axes(ax, ARCHIVE)
@@ -205,6 +224,8 @@ def between(figure: Figure) -> None:
 
 PICTURES: dict[str, Callable[[Figure], None]] = {
     "visits": visits,
+    "evolvability": evolvability,
+    "reachability": reachability,
     "births": births,
     "rows": rows_of_t,
     "transitions": transitions,
@@ -260,15 +281,13 @@ def _cells(ax: Axes) -> None:
     ax.hlines(y, x[0], x[-1], color=EMPTY, linewidth=0.6, zorder=0)
 
 
-def shrink(path: Path, width: int = 1300) -> None:
-    """No wider than a page shows, and with a palette: a third of the bytes."""
+def shrink(path: Path, width: int = 1600) -> None:
+    """No wider than a sharp screen shows a page. All colours stay: a palette makes bands of a scale."""
     with Image.open(path) as image:
         whole = image.convert("RGB")
     if whole.width > width:
         whole = whole.resize((width, round(whole.height * width / whole.width)), Image.Resampling.LANCZOS)
-    # By coverage, or the rare ends of a colour scale would be merged with other colours.
-    method = Image.Quantize.MAXCOVERAGE
-    whole.quantize(256, method, dither=Image.Dither.NONE).save(path, optimize=True)
+    whole.save(path, optimize=True)
 
 
 def draw_example(path: Path) -> None:
@@ -288,17 +307,41 @@ def draw_example(path: Path) -> None:
     print(f"wrote {out}")
 
 
+def draw_gallery() -> None:
+    """Run the blocks of the gallery, which write its pictures, and keep these."""
+    before, names = Path.cwd(), {}
+    blocks = re.findall(r"^```python\n(.*?)^```$", (HERE.parent / "gallery.md").read_text(), re.S | re.M)
+    out = HERE / "gallery"
+    out.mkdir(exist_ok=True)
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        plt.rc_context({"figure.figsize": (5.4, 5.8), "savefig.dpi": 140}),
+    ):
+        os.chdir(folder)
+        try:
+            for block in blocks:
+                exec(block, names)  # noqa: S102  # our own page
+        finally:
+            os.chdir(before)
+        for picture in sorted(Path(folder).glob("*.png")):
+            (out / picture.name).write_bytes(picture.read_bytes())
+            print(f"wrote {out / picture.name}")
+
+
 def main(names: list[str]) -> None:
     """Draw all pictures, or those of the given names."""
     examples = {path.stem: path for path in EXAMPLES.glob("0[1-4]_*.py")}
-    for name in names or [*PICTURES, *sorted(examples)]:
+    for name in names or [*PICTURES, "gallery", *sorted(examples)]:
+        if name == "gallery":
+            draw_gallery()
+            continue
         if name in examples:
             draw_example(examples[name])
             continue
         figure = Figure()
         PICTURES[name](figure)
         out = HERE / f"{name}.png"
-        figure.savefig(out, dpi=110, bbox_inches="tight")
+        figure.savefig(out, dpi=_DPI, bbox_inches="tight")
         shrink(out)
         print(f"wrote {out}")
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -9,7 +10,7 @@ import numpy as np
 from nichechain.core.checks import check_at_least
 from nichechain.core.text import some
 from nichechain.plots.cells import borders, fill
-from nichechain.plots.style import EDGE, EMPTY, INK, LONG_JUMP, START, axes_of, behavior_axes, colorbar, key
+from nichechain.plots.style import EDGE, INK, LONG_JUMP, START, axes_of, behavior_axes, colorbar, key
 
 if TYPE_CHECKING:
     import networkx as nx
@@ -22,8 +23,9 @@ if TYPE_CHECKING:
 _WIDEST = 3.0
 _LARGEST = 110.0
 _SMALLEST = 5.0
-# A niche that so many of all births fall into is a sink: arrows to it would hide all others.
-_SINK = 0.2
+# A niche that so many others lead to, or this share of them, is a sink: arrows to it would hide all others.
+_SINK = 10
+_SINK_SHARE = 0.05
 # Arrows that an eye can follow.
 _MOST_ARROWS = 60
 
@@ -41,8 +43,8 @@ def plot_reachability(
     The size of a niche shows its births and its fill how many children stay; width and opacity
     of an arrow show its probability; jumps over a quarter of the grid's diagonal, the paper's
     "wormholes", have a colour of their own. Arrows to the outside state are not drawn, nor those to
-    the sink, which is the niche of the start or one that a fifth of all births fall into: it is ringed,
-    and the note says how many niches lead there.
+    sinks: the niche of the start, and niches that at least ten others and a twentieth of all lead to.
+    They are ringed, with the number of niches that lead there.
 
     Parameters
     ----------
@@ -72,10 +74,9 @@ def plot_reachability(
     graph = chain.graph(threshold)
     graph.remove_nodes_from([node for node, x in graph.nodes(data="x") if x is None])
     borders(ax, archive.niches)
-    sink = _sink(archive)
     seen = [edge for edge in graph.edges if graph.edges[edge]["count"]]
-    falls = [edge for edge in seen if edge[1] == sink]
-    others = [edge for edge in seen if edge[1] != sink]
+    sinks = _sinks(archive, graph, seen)
+    others = [edge for edge in seen if edge[1] not in sinks]
     strongest = sorted(others, key=lambda edge: -graph.edges[edge]["probability"])[:most]
     near = [edge for edge in strongest if not graph.edges[edge]["long_jump"]]
     far = [edge for edge in strongest if graph.edges[edge]["long_jump"]]
@@ -83,14 +84,10 @@ def plot_reachability(
     _arrows(ax, graph, far, LONG_JUMP, 7)
     _nodes(ax, graph)
     note = f"{chain.estimator}; size: births"
-    if sink is not None:
-        ax.plot(
-            *archive.niches.centers[sink], "o", markersize=15, markerfacecolor="none", color=START, zorder=5
-        )
-        share = np.mean([graph.edges[edge]["probability"] for edge in falls]) if falls else 0.0
-        note += (
-            f"\nringed: {some(len(falls), 'niche leads', 'niches lead')} there, with {share:.0%} on average"
-        )
+    for sink, number in sinks.items():
+        _ring(ax, archive, sink, number)
+    if sinks:
+        note += "; ringed: that many niches lead there, by arrows that are not drawn"
     leaving = archive.counts.births_outside / max(1, archive.counts.visits.sum())
     if leaving:
         note += f"; outside ({leaving:.0%} of births) not drawn"
@@ -108,15 +105,35 @@ def plot_reachability(
     return ax
 
 
-def _sink(archive: Archive) -> int | None:
-    """The niche that births return to: of the start, or one that many of them fall into."""
+def _sinks(archive: Archive, graph: nx.DiGraph, edges: list[tuple[int, int]]) -> dict[int, int]:
+    """Niches whose arrows are counted, not drawn, and how many lead to each."""
+    leading = Counter(child for _, child in edges)
+    least = max(_SINK, _SINK_SHARE * graph.number_of_nodes())
+    found = {niche: number for niche, number in leading.items() if number >= least}
     start = archive.meta.facts.start
     if start is not None:
         back = int(archive.niches.of([start])[0])
-        return back if back < len(archive.niches) else None
-    visits = archive.counts.visits[: len(archive.niches)]
-    fullest = int(np.argmax(visits))
-    return fullest if visits[fullest] >= _SINK * max(1, archive.counts.visits.sum()) else None
+        if leading[back]:
+            found[back] = leading[back]
+    return found
+
+
+def _ring(ax: Axes, archive: Archive, niche: int, number: int) -> None:
+    from matplotlib.patheffects import withStroke
+
+    x, y = archive.niches.centers[niche]
+    ax.plot(x, y, "o", markersize=17, markerfacecolor="none", color=START, markeredgewidth=2.2, zorder=8)
+    ax.annotate(
+        str(number),
+        (x, y),
+        (0, -9),
+        textcoords="offset points",
+        fontweight="bold",
+        ha="center",
+        va="top",
+        zorder=9,
+        path_effects=[withStroke(linewidth=3.0, foreground="white")],
+    )
 
 
 def _nodes(ax: Axes, graph: nx.DiGraph) -> None:
@@ -181,6 +198,7 @@ def _arrows(ax: Axes, graph: nx.DiGraph, edges: list[tuple[int, int]], color: st
 
 _BEND = 0.15
 _MOST_LABELS = 12
+_LABELS_AT = (0.5, 0.3, 0.68)
 
 
 def plot_wormholes(archive: Archive, found: pd.DataFrame, ax: Axes | None = None) -> Axes:
@@ -209,20 +227,22 @@ def plot_wormholes(archive: Archive, found: pd.DataFrame, ax: Axes | None = None
     ax = axes_of(ax)
     from matplotlib import colormaps
     from matplotlib.cm import ScalarMappable
-    from matplotlib.colors import LogNorm, Normalize
+    from matplotlib.colors import LinearSegmentedColormap, LogNorm, Normalize
     from matplotlib.lines import Line2D
     from matplotlib.patches import FancyArrowPatch
     from matplotlib.patheffects import withStroke
 
     behavior_axes(ax, archive, strip=False)
-    ax.set_facecolor(EMPTY)
+    ax.set_facecolor("white")
     visits = archive.counts.visits[: len(archive.niches)].astype(float)
     shown = np.where(visits > 0, visits, np.nan)
-    # Births in faint grey: where there are many, a jump means less.
-    fill(ax, archive.niches, shown, "Greys", LogNorm(1.0, 1000.0 * max(2.0, visits.max())))
+    # Births in faint grey: where there are many, a jump means less. White: nobody was born there.
+    fill(ax, archive.niches, shown, "Greys", LogNorm(0.05, 5000.0 * max(2.0, visits.max())), width=0.6)
     flagged = found[found["wormhole"]].sort_values("exceeds", kind="stable")
     low = min(0.5, float(flagged["exceeds"].min())) if len(flagged) else 0.5
-    scale = ScalarMappable(Normalize(low, 1.0), colormaps["plasma_r"])
+    # The lightest colours would be lost on a light map.
+    colors = LinearSegmentedColormap.from_list("sure", colormaps["plasma_r"](np.linspace(0.25, 1.0, 64)))
+    scale = ScalarMappable(Normalize(low, 1.0), colors)
     centers = archive.niches.centers
     for number, row in enumerate(flagged.itertuples()):
         strength = float(np.sqrt(row.probability))
@@ -234,37 +254,42 @@ def plot_wormholes(archive: Archive, found: pd.DataFrame, ax: Axes | None = None
                 # Curved, so that an arrow and its opposite do not lie on each other.
                 connectionstyle=f"arc3,rad={_BEND}",
                 arrowstyle="-|>",
-                mutation_scale=8 + 8 * strength,
-                linewidth=0.8 + _WIDEST * strength,
+                mutation_scale=15 + 10 * strength,
+                linewidth=1.8 + _WIDEST * strength,
                 linestyle=":" if row.singleton else "-",
                 color=color,
-                shrinkA=2,
-                shrinkB=2,
-                zorder=3,
-                path_effects=[withStroke(linewidth=2.5 + _WIDEST * strength, foreground="#ffffffb0")],
+                shrinkA=0,
+                shrinkB=1,
+                zorder=5,
+                path_effects=[withStroke(linewidth=4.2 + _WIDEST * strength, foreground="#ffffffe0")],
             )
         )
+        ax.plot(*centers[row.parent], "o", color=color, markersize=6, markeredgecolor="white", zorder=6)
         if number >= len(flagged) - _MOST_LABELS:
-            way = centers[row.child] - centers[row.parent]
-            # The middle of the curve.
-            middle = centers[row.parent] + way / 2 + _BEND / 2 * np.array([way[1], -way[0]])
+            start, end = centers[row.parent], centers[row.child]
+            way = end - start
+            corner = start + way / 2 + _BEND * np.array([way[1], -way[0]])
+            # At places of their own along the curves: two that end in one niche lie close.
+            t = _LABELS_AT[number % len(_LABELS_AT)]
             ax.annotate(
                 f"{row.count}/{row.exposure}",
-                middle,
-                fontsize="x-small",
+                (1 - t) ** 2 * start + 2 * t * (1 - t) * corner + t**2 * end,
+                fontsize="medium",
+                fontweight="bold",
+                color=INK,
                 ha="center",
                 va="center",
-                zorder=4,
-                path_effects=[withStroke(linewidth=2.0, foreground="white")],
+                zorder=7,
+                path_effects=[withStroke(linewidth=3.5, foreground="white")],
             )
     colorbar(ax, scale, "posterior probability of being one")
     singles = int(flagged["singleton"].sum())
-    ax.set_title(f"Wormholes: {len(flagged)} of {some(len(found), 'observed transition')}")
+    ax.set_title(f"Wormholes: {len(flagged)} of {some(len(found), 'observed transition')}", pad=10)
     handles = []
     if len(flagged) > singles:
-        handles.append(Line2D([], [], color=INK, label="wormhole (births that took it / births)"))
+        handles.append(Line2D([], [], color=INK, label="wormhole: births that took it / births"))
     if singles:
         handles.append(Line2D([], [], color=INK, linestyle=":", label=f"by a single birth: {singles}"))
     false = float(flagged["cumulated_false"].max()) if len(flagged) else 0.0
-    key(ax, *handles, note=f"shade: births; {false:.2g} of the wormholes are expected to be none")
+    key(ax, *handles, note=f"shade: births; {false:.2g} of the {len(flagged)} are expected to be none")
     return ax

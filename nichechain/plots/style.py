@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -30,6 +31,8 @@ START = "#e8a33d"
 """Where a block, or a hand, is if nothing is done."""
 INK = "#333333"
 _NAMES = "#777777"
+# Letters of a line under a map.
+_NOTE = 62
 
 
 # Height of a strip that shows one axis of behavior, over its width.
@@ -146,5 +149,6 @@ def key(ax: Axes, *handles: Any, note: str | None = None) -> None:
         )
         if note:
             # As the legend's title it moves with it, however many lines the legend has.
-            legend.set_title(note)
+            lines = [line for part in note.split("\n") for line in textwrap.wrap(part, _NOTE)]
+            legend.set_title("\n".join(lines))
             legend.get_title().set(fontsize="small", color="#555555")
