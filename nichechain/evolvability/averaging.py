@@ -8,12 +8,14 @@ from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 
 from nichechain.chain.model import NicheChain, Transition
 from nichechain.core.intervals import drawn_interval
 from nichechain.core.randomness import Purpose, keyed
-from nichechain.evolvability.coverage import expected_coverage, sampled_coverage
-from nichechain.evolvability.question import Question
+from nichechain.evolvability.coverage import at_least_once, expected_coverage, sampled_coverage
+from nichechain.evolvability.question import MOST_EXACT, Question
+from nichechain.evolvability.reach import visit_probability
 from nichechain.evolvability.results import Evolvability
 
 Floats = NDArray[np.float64]
@@ -22,6 +24,8 @@ Sample: TypeAlias = tuple[Transition, Floats]
 # Lineages without end: what they visit in expectation is all that can be visited.
 ENDLESS = 10**9
 SATURATED = 0.95
+# Share of entries, and steps, up to which one root is followed through a sparse T of many states.
+_SPARSE, _FEW_STEPS = 0.02, 100
 
 
 def one_root(
@@ -33,9 +37,15 @@ def one_root(
     means, errors, saturated = [], [], False
     for number, (matrix, first) in enumerate(samples):
         if question.method != "monte-carlo":
-            covered, endless = expected_coverage(
-                matrix, first[None, :], steps, [question.lineages, ENDLESS], counted=n, own=stands
-            )[0]
+            if own is None and _is_sparse(matrix) and steps <= _FEW_STEPS:
+                # From one root few states are seen: cost follows them, not all that there are.
+                visit, _ = visit_probability(matrix, first, steps)
+                some = at_least_once(visit[:n], [question.lineages, ENDLESS])
+                covered, endless = (float(each.sum()) for each in some)
+            else:
+                covered, endless = expected_coverage(
+                    matrix, first[None, :], steps, [question.lineages, ENDLESS], counted=n, own=stands
+                )[0]
             saturated |= bool(covered > SATURATED * endless)
             means.append(covered)
             errors.append(0.0)
@@ -61,6 +71,13 @@ def one_root(
         None,
         saturated,
     )
+
+
+def _is_sparse(matrix: Transition) -> bool:
+    """Whether T is a sparse matrix of many states, each of which leads to few."""
+    if not isinstance(matrix, sparse.csr_array) or matrix.shape[0] <= MOST_EXACT:
+        return False
+    return bool(matrix.nnz <= _SPARSE * matrix.shape[0] ** 2)
 
 
 def standard_error(sampled: NDArray[np.int64]) -> float:

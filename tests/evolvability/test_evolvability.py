@@ -526,3 +526,16 @@ def test_what_could_take_over_ten_minutes_is_said_before(monkeypatch):
         l_evolvability(chain, niche=0)
     with pytest.warns(UserWarning, match="could take"):
         niche_evolvability(chain, method="monte-carlo", repeats=2)
+
+
+def test_one_root_of_many_sparse_states_has_the_closed_form():
+    from nichechain.evolvability import expected_coverage
+
+    # A ring of 1,200 states, with steps of 1, 2 and 7 and some stays.
+    states = np.arange(1200)
+    steps, share = (0, 1, 2, 7), (0.1, 0.4, 0.3, 0.2)
+    columns = np.stack([(states + step) % 1200 for step in steps], axis=1)
+    entries = np.tile(share, 1200), (np.repeat(states, 4), columns.ravel())
+    T = sparse.csr_array(entries, shape=(1200, 1200))
+    found = l_evolvability(NicheChain(T), niche=5, l=6, lineages=20).value
+    assert found == pytest.approx(expected_coverage(T, T[[5]], 6, 20)[0], rel=1e-12)
