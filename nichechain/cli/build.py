@@ -70,13 +70,18 @@ class BuildCommand(SearchConfig):
     ] = ()
     """Factor on the scale in each layer of the controller, such as 1,0.5,0.5."""
     selection: Annotated[str, parsing.option("NAME", "uniform")] = "uniform"
-    """How parents are drawn from the elites: uniform, each alike; curiosity, whose children enter;
-    reach, whose descendants would fill niches, as the chain of the births so far foretells (drawn
-    uniformly until there are births); or a mixture such as reach:0.7,uniform:0.3."""
+    """How parents are drawn from the elites: uniform, each alike; curiosity, whose children enter; by
+    the chain of the births so far (uniformly until there are births): reach, whose descendants would
+    fill niches, l-evolvability, whose descendants would visit many, information, where a birth tells
+    most of l-evolvability; or a mixture such as reach:0.7,uniform:0.3."""
     temperature: Annotated[
         float | None, parsing.option("T", "1, and 0.3 for a selection that asks the chain")
     ] = None
     """Elites are drawn in proportion to w^(1/T), for w what the selection says of each."""
+    selection_l: Annotated[int | None, parsing.option("INT", "1 for reach, else 5")] = None
+    """Generations of the lineages that a selection asks the chain about."""
+    selection_lineages: Annotated[int | None, parsing.option("INT", "1 for reach, else 100")] = None
+    """How many lineages it asks about."""
     grid: Annotated[str | None, parsing.option("NXxNY", _GRID)] = None
     """Cells of the grid along each axis of behavior."""
     niches: Annotated[str | None, parsing.option("cvt:N", "a grid")] = None

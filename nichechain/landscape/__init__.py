@@ -27,6 +27,7 @@ from nichechain.landscape.measures import (
     measure_behaviors,
 )
 from nichechain.landscape.niche_table import FEWEST_CHILDREN, niche_table
+from nichechain.landscape.populations import population_course
 
 __all__ = [
     "EPSILON",
@@ -58,5 +59,6 @@ __all__ = [
     "niche_table",
     "niches_of",
     "one_hot_evolvability",
+    "population_course",
     "population_evolvability",
 ]

@@ -25,7 +25,7 @@ Replacement = Literal["random", "first", "newest", "objective"]
 Outside = Literal["state", "absorb", "clip"]
 NichesKind = Literal["grid", "cvt"]
 MutationName = Literal["cauchy", "gaussian", "student-t", "uniform-ball"]
-SelectionName = Literal["uniform", "curiosity", "reach"]
+SelectionName = Literal["uniform", "curiosity", "reach", "l-evolvability", "information"]
 
 _MIXTURE = "'reach:0.7,uniform:0.3'"
 
@@ -69,15 +69,18 @@ class SearchConfig:
         has a layer scale, or else one for all weights. They begin at the scale.
     selection : str
         How parents are drawn from the elites: ``uniform``, each alike; ``curiosity``, whose children
-        enter; ``reach``, whose descendants would fill niches, as the chain foretells, see
-        :mod:`nichechain.steering`; or a mixture such as ``reach:0.7,uniform:0.3``.
+        enter; as the chain of the births so far foretells (:mod:`nichechain.steering`), ``reach``, whose
+        descendants would fill niches, ``l-evolvability``, whose descendants would visit many niches, and
+        ``information``, where a birth tells most of l-evolvability; or a mixture such as
+        ``reach:0.7,uniform:0.3``.
     temperature : float, optional
         Elites are drawn in proportion to w^(1/temperature), for w what the selection says of each;
         by default 1, and 0.3 for a selection that asks the chain.
-    selection_l : int
-        Generations of the lineages that a selection asks the chain about.
-    selection_lineages : int
-        How many lineages it asks about.
+    selection_l : int, optional
+        Generations of the lineages that a selection asks the chain about, by default 1 for ``reach`` and
+        5 for the others.
+    selection_lineages : int, optional
+        How many lineages it asks about, by default 1 for ``reach`` and 100 for the others.
     lineage_share : float
         Share of the births that unselected lineages get, whose parents are their own latest births:
         they show what lineages do. With 0 all parents are selected.
@@ -111,8 +114,8 @@ class SearchConfig:
     self_adaptive: bool = False
     selection: str = "uniform"
     temperature: float | None = None
-    selection_l: int = 1
-    selection_lineages: int = 1
+    selection_l: int | None = None
+    selection_lineages: int | None = None
     lineage_share: float = 0.05
     lineage_length: int = 10
     lineage_brood: int = BROOD
@@ -159,9 +162,10 @@ class BuildConfig(SearchConfig):
     domain_options: Mapping[str, DomainOption] = field(default_factory=dict, hash=False)
 
     def __post_init__(self) -> None:
+        asked = [name for name in ("selection_l", "selection_lineages") if getattr(self, name) is not None]
         whole = (
             *("evaluations", "initial", "batch", "seed", "domain_seed", "niches_seed"),
-            *("lineage_length", "lineage_brood", "selection_l", "selection_lineages"),
+            *("lineage_length", "lineage_brood", *asked),
         )
         for name in whole:
             try:
@@ -207,7 +211,7 @@ class BuildConfig(SearchConfig):
                 f"shape is {self.shape}, but a tessellation has one number of niches, such as (400,)"
             )
         parse_selection(self.selection)
-        check_at_least(1, selection_l=self.selection_l, selection_lineages=self.selection_lineages)
+        check_at_least(1, **{name: getattr(self, name) for name in asked})
         if self.temperature is not None:
             check_positive(temperature=self.temperature)
             object.__setattr__(self, "temperature", float(self.temperature))

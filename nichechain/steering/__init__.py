@@ -14,6 +14,8 @@ from nichechain.niches import Niches
 from nichechain.search.config import BuildConfig, SelectionName, parse_selection
 from nichechain.search.parents import CuriousParents
 from nichechain.search.selection import Mixture, ParentSelection, Tempered, UniformParents
+from nichechain.steering.evolvable import EvolvableParents
+from nichechain.steering.information import InformedParents
 from nichechain.steering.reach import ReachParents
 
 __all__ = ["make_selection"]
@@ -21,6 +23,8 @@ __all__ = ["make_selection"]
 _SHARPENED = 0.3
 """Temperature of selections that ask the chain: of 1, 0.5, 0.3 and 0.2 the one that needed the fewest births
 on arms and maps of other seeds than those of the study."""
+
+_L, _LINEAGES = 5, 100
 
 
 def make_selection(config: BuildConfig, niches: Niches) -> ParentSelection:
@@ -43,5 +47,14 @@ def _make(name: SelectionName, config: BuildConfig, niches: Niches) -> ParentSel
         case "curiosity":
             return Tempered(CuriousParents(), config.temperature or 1.0)
         case "reach":
-            reach = ReachParents(niches, config.batch, config.selection_l, config.selection_lineages)
-            return Tempered(reach, config.temperature or _SHARPENED)
+            l, lineages = config.selection_l or 1, config.selection_lineages or 1
+            selection: ParentSelection = ReachParents(niches, config.batch, l, lineages)
+        case "l-evolvability":
+            selection = EvolvableParents(niches, *_asked(config))
+        case "information":
+            selection = InformedParents(niches, *_asked(config))
+    return Tempered(selection, config.temperature or _SHARPENED)
+
+
+def _asked(config: BuildConfig) -> tuple[int, int]:
+    return config.selection_l or _L, config.selection_lineages or _LINEAGES

@@ -66,6 +66,11 @@ class OnlineChain:
         self._waiting.append((parent, child))
         self._number += parent.size
 
+    @property
+    def due(self) -> bool:
+        """Whether there are so many births that the prior is to be fitted again."""
+        return not self._fitted or self._number >= _GROWTH * self._fitted
+
     def settle(self) -> bool:
         """Take in all births so far; true where the prior was fitted again.
 
@@ -79,10 +84,10 @@ class OnlineChain:
             )
             self._total += np.bincount(parent, minlength=shape[0])
             self._waiting.clear()
-        if self._fitted and self._number < _GROWTH * self._fitted:
-            return False
-        self._fit()
-        return True
+        due = self.due
+        if due:
+            self._fit()
+        return due
 
     def _fit(self) -> None:
         parent, child, elite = (np.concatenate(part) for part in zip(*self._births, strict=True))
@@ -111,6 +116,19 @@ class OnlineChain:
             product[-1] = values[-1]
         # Transforms round to either side of 0.
         return np.maximum(product, 0.0)
+
+    def backwards(self, values: Floats) -> Floats:
+        """Tᵀ x for an (S, c) array."""
+        if self.niches.outside == "absorb":
+            stays = values[-1].copy()
+            values = values.copy()
+            values[-1] = 0.0
+        shares = values / self.total[:, None]
+        product: Floats = self._counts.T @ (shares / self.design_effect[:, None])
+        product += self.strength * (shares.T @ self._base).T
+        if self.niches.outside == "absorb":
+            product[-1] += stays
+        return product
 
     def staying(self) -> Floats:
         """T_ii of states in which no child of a parent there has landed, (S,), as the base has it."""

@@ -15,6 +15,7 @@ from .table import (
     SEED,
     UNKNOWN,
     Call,
+    Made,
     World,
     check_accepted,
     check_refused,
@@ -56,6 +57,11 @@ CALLS = (
             {"parents": _BAD_PAIR["parent"], "offspring": _BAD_PAIR["offspring"]},
         )
         for name in ("global_sensitivity", "expected_global_sensitivity")
+    ),
+    Call(
+        "landscape.population_course",
+        lambda w: {"births": w.births, "niches": w.archive.niches},
+        {"births": (Made(lambda w: w.births.drop(columns="step"), "no-step"),)},
     ),
     Call(
         "landscape.one_hot_evolvability",

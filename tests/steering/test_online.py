@@ -43,6 +43,7 @@ def test_it_is_the_chain_of_the_same_births(outside):
     np.testing.assert_allclose(online @ columns[:, 0], (online @ columns)[:, 0], rtol=1e-12)
     exact = estimate(counts, strength=online.strength)
     np.testing.assert_allclose(online @ columns, exact.T @ columns, rtol=1e-9)
+    np.testing.assert_allclose(online.backwards(columns), exact.T.T @ columns, rtol=1e-9)
     never = np.flatnonzero(counts.matrix.diagonal() == 0)
     never = never[never < len(niches)]
     np.testing.assert_allclose(online.staying()[never], np.diag(exact.T)[never], rtol=1e-9)

@@ -115,6 +115,8 @@ def test_nobody_is_preferred_once_all_niches_are_filled():
         {"selection_l": 3},
         {"selection_l": 2, "selection_lineages": 8, "outside": "absorb", "lineage_share": 0.2},
         {"niches": "cvt", "shape": (60,), "replacement": "objective"},
+        {"selection": "l-evolvability", "selection_lineages": 30},
+        {"selection": "information:0.8,uniform:0.2", "selection_l": 3},
     ],
 )
 def test_a_build_that_was_interrupted_has_the_same_births(values, tmp_path):
