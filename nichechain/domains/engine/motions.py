@@ -339,7 +339,8 @@ class Motions:
                 return
 
     def _add_slab(self) -> None:
-        slab = np.empty((self._rows, self._width))
+        rows = min(self._rows, self._capacity - len(self._slabs) * self._rows)
+        slab = np.empty((rows, self._width))
         self._addresses[len(self._slabs)] = slab.ctypes.data
         self._slabs.append(slab)
 

@@ -267,7 +267,9 @@ def test_everything_met_is_known() -> None:
 
 
 @pytest.mark.parametrize("nodes", [1, 2, 5, 60, 400])
-def test_memory_is_bounded_and_what_is_known_is_right(nodes: int) -> None:
+def test_memory_is_bounded_and_what_is_known_is_right(nodes: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    # The last slab is cut to what is left.
+    monkeypatch.setattr(module, "_SLAB_ROWS", 16)
     width = module._CONTENT + INPUTS + STATE
     world = World(8 * width * nodes)
     rng = np.random.default_rng(1)
