@@ -327,9 +327,19 @@ def _starts(
     return uid, landed[uid], depth[uid], genotypes, when
 
 
+def _in_time(kept: pa.Table) -> pa.Table:
+    """The same births, numbered in the order in which a search would have spent them."""
+    when = np.array(kept["births_before"]).astype(np.int64) * FIRST_UID
+    for name in ("uid", "parent_uid"):
+        number = np.array(kept[name]).astype(np.int64)
+        later = pa.array(np.where(number >= FIRST_UID, number + when, number))
+        kept = kept.set_column(kept.column_names.index(name), name, later)
+    return kept
+
+
 def _extra(path: Path, births: pa.Table) -> pa.Table:
     """Births of lineages in the columns of the others; what is not known of them is null."""
-    kept = pq.read_table(path)
+    kept = _in_time(pq.read_table(path))
     n = len(kept)
     failed = np.array(kept["child_niche"]) == NONE
     columns = {}
