@@ -40,6 +40,8 @@ FIRST_UID = 1_000_000
 """Births of lineages are numbered from here on, beyond those of any build of the table."""
 _SEEDS = {"A": 10_001, "B": 10_002, "strata": 30_001, "broods": 20_003}
 _BLOCK = {100: 20, 20: 10}
+_ROOM = BROOD << 4
+"""Numbers that the births of a brood have to themselves."""
 
 _SQUARE = ((-1.0, 1.0), (-1.0, 1.0))
 _TABLE_TOP = ((1.05, 1.55), (0.40, 1.10))
@@ -329,10 +331,18 @@ def _starts(
 
 def _in_time(kept: pa.Table) -> pa.Table:
     """The same births, numbered in the order in which a search would have spent them."""
-    when = np.array(kept["births_before"]).astype(np.int64) * FIRST_UID
+    when, brood = (np.array(kept[name]).astype(np.int64) for name in ("births_before", "lineage"))
+    brood //= BROOD
+    first = np.zeros(brood.max() + 1, np.int64)
+    last = FIRST_UID
+    for k in np.argsort([when[brood == b][0] for b in range(first.size)], kind="stable"):
+        last = max(last + _ROOM, FIRST_UID + _ROOM * int(when[brood == k][0]))
+        first[k] = last
     for name in ("uid", "parent_uid"):
         number = np.array(kept[name]).astype(np.int64)
-        later = pa.array(np.where(number >= FIRST_UID, number + when, number))
+        # Within a brood births stay in their order.
+        again = number - FIRST_UID - (brood * BROOD << 4) + first[brood]
+        later = pa.array(np.where(number >= FIRST_UID, again, number))
         kept = kept.set_column(kept.column_names.index(name), name, later)
     return kept
 
