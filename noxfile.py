@@ -124,9 +124,9 @@ def peers(session: nox.Session) -> None:
 
 @nox.session
 def examples(session: nox.Session) -> None:
-    """The examples that take longer than a test may."""
-    session.install(*PINNED, "-e", ".[test,ray]")
-    session.run("python", "-m", "pytest", "-m", "slow", "tests/test_examples.py")
+    """The examples that take longer than a test may, and the notebooks."""
+    session.install(*PINNED, "-e", ".[test,ray,box2d,notebooks]")
+    session.run("python", "-m", "pytest", "-m", "slow", "tests/test_examples.py", "tests/test_notebooks.py")
 
 
 @nox.session

@@ -42,7 +42,7 @@ def lay_out(stage: Path) -> None:
     shutil.copytree(HERE, pages, ignore=shutil.ignore_patterns("_make", "*.py", "__pycache__"))
     for name, content in generated.pages(ROOT).items():
         (pages / name).parent.mkdir(parents=True, exist_ok=True)
-        (pages / name).write_text(content, encoding="utf-8")
+        (pages / name).write_bytes(content if isinstance(content, bytes) else content.encode())
     for page in pages.rglob("*.md"):
         here = page.parent.relative_to(pages).as_posix()
         page.write_text(links.rewrite(page.read_text(encoding="utf-8"), here), encoding="utf-8")

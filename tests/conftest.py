@@ -1,6 +1,9 @@
 """What all tests share."""
 
+import math
+import re
 import signal
+from collections.abc import Callable
 
 import pytest
 from hypothesis import settings
@@ -16,9 +19,28 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
+_NUMBER = re.compile(r"-?\d+(?:\.\d+)?")
+
+
 def pytest_addoption(parser: pytest.Parser) -> None:
     """Let ``pytest --refresh-docs tests/test_docs.py`` write what blocks print into their pages."""
     parser.addoption("--refresh-docs", action="store_true", help="rewrite the outputs shown in the docs")
+
+
+@pytest.fixture
+def alike() -> Callable[[str, str], bool]:
+    """Whether two texts agree in their words, and in their numbers to 1 % or the last digit shown."""
+
+    def close(a: str, b: str) -> bool:
+        digits = len(b.partition(".")[2])
+        return math.isclose(float(a), float(b), rel_tol=0.01, abs_tol=1.01 * 10.0**-digits)
+
+    def compare(said: str, shown: str) -> bool:
+        words = [_NUMBER.sub("#", " ".join(text.split())) for text in (said, shown)]
+        numbers = [_NUMBER.findall(text) for text in (said, shown)]
+        return words[0] == words[1] and all(map(close, *numbers))
+
+    return compare
 
 
 @pytest.fixture(scope="session")

@@ -10,7 +10,6 @@ writes what the blocks print now into their pages.
 import ast
 import dataclasses
 import importlib.util
-import math
 import re
 import shlex
 from pathlib import Path
@@ -28,7 +27,6 @@ _BLOCK = re.compile(
     re.DOTALL | re.MULTILINE,
 )
 _SNIPPET = re.compile(r'^--8<-- "(?P<path>[^":]+)(?::(?P<ranges>[\d:,]+))?"$', re.MULTILINE)
-_NUMBER = re.compile(r"-?\d+(?:\.\d+)?")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -93,18 +91,6 @@ def run(block: Block, names: dict[str, object], page: Path) -> None:
     exec(compile(tree, str(page), "exec"), names)
 
 
-def alike(said: str, shown: str) -> bool:
-    """Whether two texts agree in their words, and in their numbers to 1 % or the last digit shown."""
-
-    def close(a: str, b: str) -> bool:
-        digits = len(b.partition(".")[2])
-        return math.isclose(float(a), float(b), rel_tol=0.01, abs_tol=1.01 * 10.0**-digits)
-
-    words = [_NUMBER.sub("#", " ".join(text.split())) for text in (said, shown)]
-    numbers = [_NUMBER.findall(text) for text in (said, shown)]
-    return words[0] == words[1] and all(map(close, *numbers))
-
-
 def _cases():
     for page in PAGES:
         blocks = blocks_of(page.read_text(encoding="utf-8"))
@@ -116,7 +102,7 @@ def _cases():
 
 
 @pytest.mark.parametrize(("page", "slow"), list(_cases()))
-def test_blocks_of_a_page_run(page, slow, tmp_path, monkeypatch, capsys, request):
+def test_blocks_of_a_page_run(page, slow, alike, tmp_path, monkeypatch, capsys, request):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("COLUMNS", "100")
     matplotlib.use("agg")
@@ -151,7 +137,7 @@ def test_blocks_of_a_page_run(page, slow, tmp_path, monkeypatch, capsys, request
         ("wrote a.png", "wrote a.png", True),
     ],
 )
-def test_outputs_are_compared_by_words_and_numbers(said, shown, same):
+def test_outputs_are_compared_by_words_and_numbers(said, shown, same, alike):
     assert alike(said, shown) == same
 
 

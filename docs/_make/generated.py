@@ -1,7 +1,7 @@
 """Pages that are made when the site is built, so that none can fall behind the code.
 
 The command line from what its commands say of themselves, the Python reference from docstrings, and
-one page for every numbered example.
+one page for every numbered example and every notebook.
 """
 
 from __future__ import annotations
@@ -14,14 +14,24 @@ import sys
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
+import griffe
+import notebooks
+
 # The command line has a page of its own, and shipped archives are no room.
 _NOT_PYTHON = ("cli", "archives")
+_ROLE = re.compile(r":[a-z]+:`~?([\w.]+)`")
+_SENTENCE = re.compile(r"(?<=[.?!])\s+(?=[A-Z])")
 _SUBCOMMAND = re.compile(r"^  ([a-z]+) [A-Z]+ ", re.MULTILINE)
 
 
-def pages(root: Path) -> dict[str, str]:
-    """All of them, by their paths in the documentation."""
-    return {"cli.md": command_line()} | examples(root) | reference(root / "nichechain")
+def pages(root: Path) -> dict[str, str | bytes]:
+    """All of them, and the pictures of notebooks, by their paths in the documentation."""
+    return {
+        "cli.md": command_line(),
+        **examples(root),
+        **reference(root / "nichechain"),
+        **notebooks.pages(root / "docs/notebooks"),
+    }
 
 
 def command_line() -> str:
@@ -70,7 +80,8 @@ def examples(root: Path) -> dict[str, str]:
 
 def reference(package: Path) -> dict[str, str]:
     """One page for each room, of what its packages have for users, and one of what comes in one import."""
-    made = {"api/nichechain.md": _front(_exported(package / "__init__.py"))}
+    known = griffe.load("nichechain", search_paths=[package.parent], resolve_aliases=True)
+    made = {"api/nichechain.md": _front(known, _exported(package / "__init__.py"))}
     for room in sorted(path.parent for path in package.glob("*/__init__.py")):
         if room.name not in _NOT_PYTHON:
             packages = sorted(room.rglob("__init__.py"), key=lambda path: (len(path.parts), path))
@@ -79,37 +90,53 @@ def reference(package: Path) -> dict[str, str]:
             for path in packages:
                 names = [name for name in _exported(path) if name not in seen]
                 seen.update(names)
-                parts += _package(package.parent, path.parent, names) if names else []
+                parts += _package(known, package.parent, path.parent, names) if names else []
             made[f"api/{room.name}.md"] = "\n\n".join([f"# nichechain.{room.name}", *parts])
     return made
 
 
-def _package(root: Path, folder: Path, exported: list[str]) -> list[str]:
-    """What a package says of itself, the line that imports what it has, and a description of each name."""
+def _package(known: griffe.Object, root: Path, folder: Path, exported: list[str]) -> list[str]:
+    """What a package says of itself, a line for each name that it has, and a description of each."""
     package = ".".join(folder.relative_to(root).parts)
     inner = [] if package.count(".") == 1 else [f"## {package}"]
-    names = "\n".join(f"    {each}," for each in exported)
     # A function may bear the name of its module.
     homes = [f"{package}.{each}" if (folder / f"{each}.py").is_file() else package for each in exported]
     return [
         *inner,
         f"::: {package}\n    options:\n      members: false\n      show_root_heading: false\n"
         "      show_root_toc_entry: false",
-        f"```python\nfrom {package} import (\n{names}\n)\n```",
+        f"Each is had by `from {package} import NAME`.",
+        _table(known, {each: f"{home}.{each}" for home, each in zip(homes, exported, strict=True)}),
         *(f"::: {home}.{each}" for home, each in zip(homes, exported, strict=True)),
     ]
 
 
-def _front(exported: list[str]) -> str:
-    names = "\n".join(
-        f'- <autoref identifier="nichechain.{name}" optional><code>nc.{name}</code></autoref>'
-        for name in exported
-    )
+def _front(known: griffe.Object, exported: list[str]) -> str:
     return (
         "# nichechain\n\n::: nichechain\n    options:\n      members: false\n"
         "      show_root_heading: false\n\n```python\nimport nichechain as nc\n```\n\n"
-        f"What that gives, each described with the room that it comes from:\n\n{names}\n"
+        "What that gives, each described with the room that it comes from:\n\n"
+        + _table(known, {f"nc.{name}": f"nichechain.{name}" for name in exported})
     )
+
+
+def _table(known: griffe.Object, names: dict[str, str]) -> str:
+    """A line for each name: a link to its description, and the first sentence of that."""
+    lines = [
+        f'| <autoref identifier="{path}" optional><code>{name}</code></autoref> | {_sentence(known, path)} |'
+        for name, path in names.items()
+    ]
+    return "\n".join(["| name | what it is |", "|---|---|", *lines])
+
+
+def _sentence(known: griffe.Object, path: str) -> str:
+    found = known[path.removeprefix("nichechain.")]
+    target = found.final_target if isinstance(found, griffe.Alias) else found
+    if target.docstring is None:
+        return f"`{target.value}`" if isinstance(target, griffe.Attribute) else ""
+    text = " ".join(target.docstring.value.partition("\n\n")[0].split())
+    sentence = _SENTENCE.split(text, maxsplit=1)[0]
+    return _ROLE.sub(r"`\1`", sentence).replace("``", "`").replace("|", "\\|")
 
 
 def _exported(path: Path) -> list[str]:

@@ -27,7 +27,9 @@ Unvisited = Literal["self", "uniform", "base", "absorb"]
 _FILLED = 20_000_000
 
 ESTIMATORS: tuple[str, ...] = get_args(Estimator)
+"""What T can be estimated by."""
 UNVISITED: tuple[str, ...] = get_args(Unvisited)
+"""What a row of T can be where no child was born."""
 
 
 def estimate(

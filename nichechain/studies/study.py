@@ -18,7 +18,6 @@ Kind = Literal["pressure", "metrics", "sensitivity"]
 LEVELS = ("selective", "0.1", "0.25", "0.5", "0.75", "random")
 METRICS = ("kde", "knn", "knn-no-archive", "ancestors", "parent")
 
-# What the paper leaves open, and the values worth comparing; the paper's own, as we read it, among them.
 VARIATIONS: dict[str, dict[str, Sequence[Any]]] = {
     "scale": {"scale": (0.01, 0.1, 1.0)},
     "bandwidth-mode": {"mode": ("factor", "length")},
@@ -37,6 +36,7 @@ VARIATIONS: dict[str, dict[str, Sequence[Any]]] = {
         )
     },
 }
+"""What the paper leaves open, and the values worth comparing; the paper's own, as we read it, among them."""
 _KDE = ("bandwidth-mode", "decay")
 
 
