@@ -2,7 +2,7 @@
 
 The search is the well-known arm repertoire: reach every place with the smoothest posture. What is
 added for nichechain is marked with ``# +``. Run it anywhere after installing nichechain and
-``pip install 'ribs[visualize]'``; it takes about half a minute and leaves ``pyribs_arm.png`` in the
+``pip install 'nichechain[visualize]'``; it takes about half a minute and leaves ``pyribs_arm.png`` in the
 current folder.
 """
 

@@ -13,7 +13,7 @@ SCRIPTS = sorted(EXAMPLES.glob("[0-9][0-9]_*.py"))
 # Those that are over in some ten seconds; all others run with -m slow.
 QUICK = {"01_quickstart", "02_ask_the_chain", "03_walks", "04_own_domain"}
 # What an example needs beyond what nichechain does.
-NEEDS = {"05_ray_cluster": "ray"}
+NEEDS = {"05_ray_cluster": "ray", "09_qdax": "qdax"}
 # A cluster has nothing to draw.
 NO_PICTURE = {"05_ray_cluster"}
 

@@ -183,7 +183,10 @@ class Archive:
         return self.domain.controller(self.elite(niche).genotype)
 
     def to_ribs(self) -> Any:
-        """The elites as an archive of pyribs, see :func:`nichechain.pyribs.to_ribs`."""
+        """The elites as an archive of pyribs, see :func:`nichechain.pyribs.to_ribs`.
+
+        By default of a build an elite is a random birth of its niche, not the best.
+        """
         from nichechain.pyribs import to_ribs
 
         return to_ribs(self)

@@ -73,6 +73,7 @@ def _run(given: Sequence[str]) -> int:
     if words[0] not in COMMANDS:
         return _fail(f"there is no command {words[0]!r}: it must be one of {', '.join(COMMANDS)}")
     from nichechain.core.errors import NichechainError
+    from nichechain.core.optional import missing
 
     try:
         status: int = module_of(words[0]).run(words[1:])
@@ -81,6 +82,10 @@ def _run(given: Sequence[str]) -> int:
         if debug:
             raise
         return _fail(str(error))
+    except ModuleNotFoundError as error:
+        if debug or (error.name or "").startswith("nichechain"):
+            raise
+        return _fail(str(missing(error, f"nichechain {words[0]}, asked like this,")))
     except KeyboardInterrupt:
         if debug:
             raise

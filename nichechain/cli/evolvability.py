@@ -94,6 +94,8 @@ def run(arguments: Sequence[str]) -> int:
     frame["uncertainty"] = command.uncertainty
     if command.uncertainty != "posterior":
         _set_band(frame, command, archive)
+    elif frame["low"].isna().all():
+        frame["uncertainty"] = None
     _write(frame, command, _drift(command, archive, chain))
     return 0
 
@@ -288,8 +290,8 @@ def _write(frame: pd.DataFrame, command: EvolvabilityCommand, drift: str) -> Non
     )
     if first.root == "elite":
         shown.print(f"[dim]{_where_they_begin(frame, command)}[/]")
-    # A given T has no interval; a niche of one elite has a bootstrap, though without spread.
-    given = command.uncertainty == "posterior" and bool((frame["low"] == frame["high"]).all())
+    # Without a posterior there is no interval.
+    given = bool(frame["low"].isna().all())
     columns = [first.root, "niches reached", *([] if given else [_LABELS[command.uncertainty]]), "± s.e."]
     own = ["children"] if "recorded" in frame else []
     table = output.table(*columns, "births behind the row", *own)
@@ -299,6 +301,8 @@ def _write(frame: pd.DataFrame, command: EvolvabilityCommand, drift: str) -> Non
         error = f"{row.standard_error:.2f}"
         table.add_row(row.index, f"{row.value:.2f}", *interval, error, str(row.births), *recorded)
     shown.print(table)
+    if given:
+        shown.print("No interval: T is a single estimate, and no posterior says what births leave open.")
     few = frame[frame["births"] < command.min_births]
     if len(few):
         shown.print(

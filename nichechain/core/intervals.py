@@ -40,6 +40,12 @@ def drawn_interval(draws: ArrayLike, axis: int = 0) -> tuple[Floats, Floats]:
     return low, high
 
 
+def no_interval(value: Floats) -> tuple[Floats, Floats]:
+    """The bounds of values of a single T: a given one, or an estimate without a posterior, has no spread."""
+    none = np.full_like(value, np.nan, dtype=np.float64)
+    return none, none
+
+
 def mean_interval(values: ArrayLike) -> tuple[Floats, Floats, Floats]:
     """Mean over runs with its t-interval.
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from nichechain.chain.model import NicheChain, Transition
-from nichechain.core.intervals import drawn_interval
+from nichechain.core.intervals import drawn_interval, no_interval
 from nichechain.core.randomness import Purpose, keyed
 from nichechain.evolvability.coverage import at_least_once, expected_coverage, sampled_coverage
 from nichechain.evolvability.question import MOST_EXACT, Question
@@ -104,8 +104,8 @@ def summary(
 ) -> tuple[Floats, Floats, Floats, Floats]:
     """Mean over the draws along axis 0, its standard error, and the interval, see :func:`widened`."""
     size = len(means)
-    low, high = widened(means.mean(axis=0), *drawn_interval(means), spread, most)
     if size == 1:
-        return means[0], errors[0], low, high
+        return means[0], errors[0], *no_interval(means[0])
+    low, high = widened(means.mean(axis=0), *drawn_interval(means), spread, most)
     # The spread of the draws' means already has the simulations' error in it.
     return means.mean(axis=0), means.std(axis=0, ddof=1) / math.sqrt(size), low, high

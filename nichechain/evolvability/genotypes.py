@@ -134,8 +134,9 @@ def genotype_evolvability(
     if guessed and question.steps == 1 and not recorded and lineages <= observed:
         # No distribution has to be guessed: these are children, and there are enough of them.
         value = rarefied_coverage(counts, lineages, counted=chain.n_niches)
-        low, high = min(result.low, value), max(result.high, value)
-        return replace(result, value=value, standard_error=0.0, low=low, high=high, method="rarefaction")
+        low, high = np.fmin(result.low, value), np.fmax(result.high, value)
+        result = replace(result, low=float(low), high=float(high))
+        return replace(result, value=value, standard_error=0.0, method="rarefaction")
     return result
 
 

@@ -11,7 +11,7 @@ from scipy import sparse
 
 from nichechain.chain.model import NicheChain, Transition
 from nichechain.chain.operator import PooledTransition
-from nichechain.core.intervals import drawn_interval
+from nichechain.core.intervals import drawn_interval, no_interval
 from nichechain.evolvability.coverage import at_least_once, visit_probabilities
 from nichechain.evolvability.question import DRAWS, Convention, Question, Root
 from nichechain.niches import Niche
@@ -35,8 +35,8 @@ class Reach:
     expected_visits : (n,) float64 array
         Descendants in niche j in expectation, of all U lineages.
     low, high : (n,) float64 arrays
-        5 % and 95 % quantiles of ``at_least_one`` over posterior draws of T; equal to it where T
-        is given.
+        5 % and 95 % quantiles of ``at_least_one`` over posterior draws of T; NaN where T is
+        not drawn.
     l, lineages : int
         Generations, and number U of lineages.
     convention, estimator : str
@@ -134,7 +134,7 @@ def reach(
         visits.append(visit[:n])
         descendants.append(lineages * passes[:n])
         some.extend(at_least_once(visit[:n], [lineages]))
-    low, high = drawn_interval(some)
+    low, high = drawn_interval(some) if len(some) > 1 else no_interval(some[0])
     return Reach(
         np.mean(visits, axis=0),
         np.mean(some, axis=0),

@@ -27,8 +27,8 @@ class Evolvability:
     standard_error : float
         Of ``value``, from the finite number of draws and simulations.
     low, high : float
-        5 % and 95 % quantiles over the draws: what births leave open. Equal to ``value`` where T
-        is given.
+        5 % and 95 % quantiles over the draws: what births leave open. NaN where T is not drawn: it is
+        given, or estimated by ``mle``, which has no posterior.
     l, lineages : int
         Generations, and number U of lineages.
     method, convention, estimator : str
@@ -62,7 +62,7 @@ class Evolvability:
         return facts_table(
             f"{self.l}-evolvability: {self.value:.2f} niches",
             {
-                "90 % interval": f"{self.low:.2f} to {self.high:.2f}",
+                "90 % interval": self._interval,
                 "standard error": self.standard_error,
                 "lineages": f"{self.lineages}, saturated" if self.saturated else self.lineages,
                 "births behind the row": "T is given" if self.births is None else self.births,
@@ -74,9 +74,13 @@ class Evolvability:
 
     def __str__(self) -> str:
         return (
-            f"{self.value:.2f} niches ({self.low:.2f} to {self.high:.2f}; l = {self.l}, "
+            f"{self.value:.2f} niches ({self._interval}; l = {self.l}, "
             f"{self.lineages} lineages, {self.convention}, {self.estimator}, {self.method})"
         )
+
+    @property
+    def _interval(self) -> str:
+        return "no interval" if np.isnan(self.low) else f"{self.low:.2f} to {self.high:.2f}"
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nichechain.chain.lineages import urns_of
-from nichechain.core.intervals import drawn_interval
+from nichechain.core.intervals import drawn_interval, no_interval
 from nichechain.core.randomness import Purpose, keyed
 from nichechain.execution.side_by_side import side_by_side
 
@@ -65,7 +65,7 @@ class Simulated:
         drawn, noise = self.coverage[:, :, size], self.noise[:, :, size].mean(axis=0)
         mean = drawn.mean(axis=0)
         if len(drawn) == 1:
-            return mean, np.sqrt(noise), mean, mean
+            return mean, np.sqrt(noise), *no_interval(mean)
         spread = drawn.var(axis=0, ddof=1)
         own = 1.0 - noise / np.maximum(spread, 1e-300)
         together = 1.0 - noise.mean() / max(spread.mean(), 1e-300)

@@ -12,6 +12,7 @@ from nichechain.core.errors import NichechainError
 from nichechain.core.text import some
 from nichechain.plots.cells import fill, frame, hatch
 from nichechain.plots.style import EMPTY, INK, axes_of, behavior_axes, colorbar, key, on_map
+from nichechain.search.config import WHO_IS_ELITE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -26,6 +27,8 @@ if TYPE_CHECKING:
 
 def plot_elites(archive: Archive, ax: Axes | None = None) -> Axes:
     """Objective of the elite of every niche, and where each elite really ends.
+
+    A note says which rule made the elites: by default of a build they are not the best.
 
     Parameters
     ----------
@@ -49,7 +52,8 @@ def plot_elites(archive: Archive, ax: Axes | None = None) -> Axes:
     ax.plot(x, y, ".", color="white", markersize=3, markeredgecolor="none", alpha=0.9)
     colorbar(ax, mesh, archive.meta.facts.objective_name)
     ax.set_title(f"Elites: {archive.filled} of {len(archive.niches)} niches filled")
-    key(ax, Line2D([], [], marker=".", linestyle="none", color="#777777", label="behavior of an elite"))
+    handle = Line2D([], [], marker=".", linestyle="none", color="#777777", label="behavior of an elite")
+    key(ax, handle, note=f"elites: {WHO_IS_ELITE[archive.config.replacement]} of each niche")
     return ax
 
 
@@ -149,7 +153,7 @@ def plot_uncertainty(archive: Archive, scores: NicheEvolvability, ax: Axes | Non
     """
     ax = axes_of(ax)
     width = scores.high - scores.low
-    if not width.any():
+    if not np.nansum(width):
         raise NichechainError(f"T is given by {scores.estimator}, which leaves no interval to draw")
     births = archive.counts.births[: len(archive.niches)]
     behavior_axes(ax, archive)

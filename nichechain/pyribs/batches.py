@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
 # What archives of pyribs tell of solutions that are added.
@@ -36,18 +35,3 @@ def spread(some: dict[str, Any], fine: Bools) -> dict[str, NDArray[Any]]:
     for name, values in some.items():
         whole[name][fine] = values
     return whole
-
-
-def one_by_one(cell: Ints, objective: NDArray[Any], entered: Bools) -> Bools:
-    """Who would have become an elite, births of a batch being offered one by one.
-
-    pyribs says who is better than the elites before the batch, of which all but one are not kept.
-    """
-    best: dict[int, float] = {}
-    accepted = entered.copy()
-    for row in np.flatnonzero(entered).tolist():
-        niche, value = int(cell[row]), float(objective[row])
-        accepted[row] = value > best.get(niche, -np.inf)
-        if accepted[row]:
-            best[niche] = value
-    return accepted

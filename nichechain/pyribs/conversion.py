@@ -16,6 +16,7 @@ from nichechain.core.errors import NichechainError
 from nichechain.domains.base import Evaluation
 from nichechain.niches.ribs import empty_archive, niches_of
 from nichechain.pyribs.recording import Recording, recording_of
+from nichechain.search.config import WHO_IS_ELITE
 from nichechain.search.elites import Elites, SearchState
 
 if TYPE_CHECKING:
@@ -128,8 +129,9 @@ def to_ribs(archive: Archive) -> Any:
     Returns
     -------
     ribs.archives.GridArchive or CVTArchive
-        Its objective is the domain's, not what decided about replacement here. The elite of the
-        outside state is left out: pyribs would put it in a cell that it is not in.
+        Its objective is the domain's, not what decided about replacement here: where that is another,
+        it warns which births the elites are. The elite of the outside state is left out: pyribs would
+        put it in a cell that it is not in.
 
     Raises
     ------
@@ -139,6 +141,13 @@ def to_ribs(archive: Archive) -> Any:
     elites = archive.elites[archive.elites.niche < len(archive.niches)]
     if not len(elites):
         raise NichechainError(f"{archive.folder} has no elites in its niches, and pyribs keeps nothing else")
+    rule = archive.config.replacement
+    if rule != "objective":
+        warnings.warn(
+            f"the elites are {WHO_IS_ELITE[rule]} of each niche and not the best (replacement: {rule}), "
+            "and so is what pyribs says of their objectives",
+            stacklevel=2,
+        )
     made = empty_archive(
         archive.niches,
         solution_dim=elites.genotype.shape[1],

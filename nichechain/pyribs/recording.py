@@ -13,12 +13,13 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
+from nichechain.births.acceptance import one_by_one
 from nichechain.births.table import NONE
 from nichechain.core.checks import check_choice
 from nichechain.core.errors import NichechainError
 from nichechain.niches import Niches
 from nichechain.niches.base import is_inside, precision_of
-from nichechain.pyribs.batches import are_batch, finite, one_by_one, spread
+from nichechain.pyribs.batches import are_batch, finite, spread
 from nichechain.pyribs.emissions import Emissions
 from nichechain.pyribs.ledger import Ledger
 from nichechain.pyribs.parents import Parents, StrategyConvention

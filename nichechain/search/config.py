@@ -29,6 +29,14 @@ SelectionName = Literal["uniform", "curiosity", "reach", "l-evolvability", "info
 
 _MIXTURE = "'reach:0.7,uniform:0.3'"
 
+WHO_IS_ELITE: dict[str, str] = {
+    "random": "a random birth",
+    "first": "the first birth",
+    "newest": "the last birth",
+    "objective": "the best birth",
+}
+"""Which birth of a niche is its elite, by the rule of replacement."""
+
 MOST_FAILED = 0.5
 """Share of births that may fail before a run is stopped, unless told otherwise."""
 

@@ -44,7 +44,8 @@ CALLS: tuple[Call, ...] = sum(
 )
 
 # Their options have a table of their own, tests/inputs/test_cli.py.
-_ELSEWHERE = ("nichechain.cli",)
+# What needs an extra is tried beside its tests.
+_ELSEWHERE = ("nichechain.cli", "nichechain.qdax")
 
 
 def _public() -> dict[str, Any]:
