@@ -20,6 +20,7 @@ from nichechain.chain import NicheChain, TransitionCounts, estimate
 from nichechain.chain.filters import counts_of
 from nichechain.core.errors import ArchiveError, NichechainError
 from nichechain.core.notebook import facts_table
+from nichechain.core.suggestions import did_you_mean
 from nichechain.domains.base import Domain
 from nichechain.niches import Niche, Niches
 from nichechain.niches.plain import ATTRIBUTE, to_plain
@@ -286,9 +287,15 @@ def _shipped(path: Path) -> Path | None:
         if read.is_archive(root / path.name):
             return root / path.name
     if len(path.parts) == 1 and shipped():
+        own = [str(entry) for entry in Path("archives").glob("*") if read.is_archive(entry)]
+        near = did_you_mean(str(path), shipped()) or did_you_mean(f"archives/{path}", own)
         raise ArchiveError(
-            f"{path} is neither a folder nor an archive that ships with nichechain ({', '.join(shipped())})"
+            f"{path} is neither a folder nor an archive that ships with nichechain "
+            f"({', '.join(shipped())}){near}"
         )
+    near = did_you_mean(str(path), [str(entry) for entry in path.parent.glob("*") if read.is_archive(entry)])
+    if near:
+        raise ArchiveError(f"{path} is no archive: there is no such folder{near}")
     return None
 
 

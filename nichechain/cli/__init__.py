@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import builtins
+import contextlib
 import importlib
 import keyword
 import os
@@ -61,7 +62,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _run(given: Sequence[str]) -> int:
     debug = "--debug" in given
-    words = [word for word in given if word != "--debug"]
+    quiet = "--quiet" in given
+    words = [word for word in given if word not in ("--debug", "--quiet")]
     if not words or words[0] in ("-h", "--help", "help"):
         print(_help())
         return 0
@@ -71,12 +73,18 @@ def _run(given: Sequence[str]) -> int:
         print(f"nichechain {__version__}")
         return 0
     if words[0] not in COMMANDS:
-        return _fail(f"there is no command {words[0]!r}: it must be one of {', '.join(COMMANDS)}")
+        from nichechain.core.suggestions import did_you_mean
+
+        known = ", ".join(COMMANDS)
+        near = did_you_mean(words[0], COMMANDS)
+        return _fail(f"there is no command {words[0]!r}: it must be one of {known}{near}")
+    from nichechain.cli import progress
     from nichechain.core.errors import NichechainError
     from nichechain.core.optional import missing
 
     try:
-        status: int = module_of(words[0]).run(words[1:])
+        with progress.quietly() if quiet else contextlib.nullcontext():
+            status: int = module_of(words[0]).run(words[1:])
         sys.stdout.flush()
     except NichechainError as error:
         if debug:
@@ -120,7 +128,7 @@ def _fail(message: str) -> int:
 def _help() -> str:
     width = max(map(len, COMMANDS))
     lines = [
-        "usage: nichechain COMMAND ... [--debug]",
+        "usage: nichechain COMMAND ... [--quiet] [--debug]",
         "",
         "Evolvability in quality-diversity search: which niches will the descendants reach?",
         "",
@@ -128,7 +136,7 @@ def _help() -> str:
         *(f"  {name:<{width}}  {text}" for name, text in COMMANDS.items()),
         "",
         "nichechain COMMAND --help tells a command's options; --json writes tables as JSON;",
-        "--version tells the version; --debug shows where an error comes from.",
+        "--quiet shows no progress; --debug shows where an error comes from; --version tells the version.",
         "",
         "try:",
         "  nichechain build fetch",

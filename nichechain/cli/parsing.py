@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields
 from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias, TypeVar
 
 import tyro
 
+from nichechain.cli import refusals
 from nichechain.core.errors import NichechainError
 
 if TYPE_CHECKING:
@@ -22,6 +24,9 @@ ArchivePath: TypeAlias = Annotated[
         metavar="PATH", help="Archive folder, or the name of an archive that ships with nichechain."
     ),
 ]
+# Such as 1e4 or 2.5e6; two digits of the power are more than any number here needs.
+_POWER = re.compile(r"([+-]?\d+)(?:\.(\d+))?[eE]\+?(\d{1,2})")
+
 EstimatorName: TypeAlias = Literal["empirical-bayes", "dirichlet", "mle"]
 Workers: TypeAlias = Annotated[
     str | None,
@@ -49,7 +54,7 @@ def parse(
     default: Command | None = None,
     name: str | None = None,
 ) -> Command:
-    """Read a command's options; exits with status 2 and a message if they are not well-formed.
+    """Read a command's options; exits where their help is asked for.
 
     Parameters
     ----------
@@ -63,7 +68,7 @@ def parse(
     Raises
     ------
     NichechainError
-        If a text is not what :func:`parsed` wants.
+        If options are unknown or missing, or a text is not what one of them wants.
     """
     name = name or called(command)
     if "--json" in arguments and any(f.name == "format" for f in fields(command)):  # type: ignore[arg-type]
@@ -72,16 +77,54 @@ def parse(
         arguments = [*arguments[:place], "--format", "json", *arguments[place + 1 :]]
     given = {} if default is None else {"default": default}
     try:
-        read: Command = tyro.cli(  # type: ignore[call-overload]
-            command,
-            prog=f"nichechain {name}",
-            args=list(arguments),
-            config=(tyro.conf.FlagCreatePairsOff,),
-            **given,
-        )
+        with refusals.in_one_sentence(f"nichechain {name}"):
+            read: Command = tyro.cli(  # type: ignore[call-overload]
+                command,
+                prog=f"nichechain {name}",
+                args=list(arguments),
+                config=(tyro.conf.FlagCreatePairsOff,),
+                registry=_kinds(),
+                **given,
+            )
     except _Refused as refused:
         raise refused.error from None
     return read
+
+
+def _kinds() -> tyro.constructors.ConstructorRegistry:
+    """How values are read that tyro reads otherwise: 1e4 is a whole number."""
+    registry = tyro.constructors.ConstructorRegistry()
+
+    @registry.primitive_rule
+    def _whole(info: tyro.constructors.PrimitiveTypeInfo) -> Any:
+        if info.type is not int:
+            return None
+        return tyro.constructors.PrimitiveConstructorSpec(
+            1,
+            "INT",
+            lambda words: whole(words[0]),
+            lambda value: isinstance(value, int),
+            lambda value: [str(value)],
+        )
+
+    return registry
+
+
+def whole(text: str) -> int:
+    """A whole number, of digits or as 1e4.
+
+    Raises
+    ------
+    ValueError
+        If it is none.
+    """
+    match = _POWER.fullmatch(text.strip())
+    if match is None:
+        return int(text)
+    digits, behind, power = match[1], match[2] or "", int(match[3])
+    if len(behind) > power:
+        raise ValueError(f"invalid literal for int(): {text!r}")
+    return int(f"{digits}{behind}{'0' * (power - len(behind))}")
 
 
 def called(command: Callable[..., Command]) -> str:

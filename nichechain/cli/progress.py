@@ -6,6 +6,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from contextvars import ContextVar
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -18,6 +19,19 @@ if TYPE_CHECKING:
 _LINE_EVERY = 10.0
 
 
+_QUIET = ContextVar("quiet", default=False)
+
+
+@contextmanager
+def quietly() -> Iterator[None]:
+    """Show no progress within this block."""
+    before = _QUIET.set(True)
+    try:
+        yield
+    finally:
+        _QUIET.reset(before)
+
+
 def leave_at_next_interrupt() -> None:
     """Have Ctrl-C end the process at once: all is kept, and only a rollout is still waited for."""
     import os
@@ -28,17 +42,13 @@ def leave_at_next_interrupt() -> None:
 
 def spinner(text: str) -> Any:
     """Something that turns while a thing is loaded; nothing where there is no terminal."""
-    from rich.console import Console
-
-    return Console(stderr=True).status(text)
+    return _console().status(text)
 
 
 @contextmanager
 def build_progress(total: int) -> Iterator[Callable[[BuildProgress], None]]:
     """A bar of births on standard error; plain lines now and then where that is no terminal."""
-    from rich.console import Console
-
-    shown, clock, lines = Console(stderr=True), _Clock(), _Lines()
+    shown, clock, lines = _console(), _Clock(), _Lines()
     if not shown.is_terminal:
 
         def line(now: BuildProgress) -> None:
@@ -86,9 +96,7 @@ def counting(total: int, what: str) -> Iterator[Callable[[int], None]]:
     callable
         Told how many are done.
     """
-    from rich.console import Console
-
-    shown, clock, lines = Console(stderr=True), _Clock(), _Lines()
+    shown, clock, lines = _console(), _Clock(), _Lines()
     if not shown.is_terminal:
 
         def line(done: int) -> None:
@@ -132,9 +140,7 @@ def stages() -> Iterator[Callable[[str, int, int], None]]:
     callable
         Told the stage, and how many of how many are done.
     """
-    from rich.console import Console
-
-    shown, lines = Console(stderr=True), _Lines()
+    shown, lines = _console(), _Lines()
     clocks: dict[str, _Clock] = {}
     if not shown.is_terminal:
 
@@ -176,7 +182,14 @@ def _bar(shown: Console, *texts: str, named: bool = False) -> Progress:
 
 
 def _say(text: str) -> None:
-    print(text, file=sys.stderr, flush=True)
+    if not _QUIET.get():
+        print(text, file=sys.stderr, flush=True)
+
+
+def _console() -> Console:
+    from rich.console import Console
+
+    return Console(stderr=True, quiet=_QUIET.get())
 
 
 class _Lines:

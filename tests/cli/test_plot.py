@@ -62,7 +62,6 @@ def test_bad_options_write_nothing(built, tmp_path, monkeypatch, capsys, options
     assert not list(tmp_path.iterdir())
 
 
-def test_unknown_kind(built):
-    with pytest.raises(SystemExit) as stopped:
-        main(["plot", str(built), "histogram"])
-    assert stopped.value.code == 2
+def test_unknown_kind(built, capsys):
+    assert main(["plot", str(built), "wormhole"]) == 2
+    assert "kind is 'wormhole', but must be one of elites, " in capsys.readouterr().err
