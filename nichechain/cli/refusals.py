@@ -13,6 +13,7 @@ from contextlib import contextmanager
 from nichechain.core.errors import NichechainError
 from nichechain.core.suggestions import did_you_mean
 
+_COLOUR = re.compile(r"\x1b\[[0-9;]*m")
 _RULE = re.compile(r"[─━-]{5,}")
 _CHOICE = re.compile(
     r"invalid choice '(?P<value>.*)' for argument '(?P<name>.*)'\. Expected one of \((?P<known>.*)\)"
@@ -69,8 +70,11 @@ def sentence(framed: str, name: str) -> str | None:
     name : str
         The command.
     """
-    lines = [line.strip("│| ").strip() for line in framed.splitlines()]
+    lines = [line.strip("│| ").strip() for line in _COLOUR.sub("", framed).splitlines()]
     inside = [line for line in lines if line and line[0] not in "╭╰"]
+    if len(inside) > 1 and "╭" not in framed and _RULE.match(inside[1]):
+        # Where only ASCII can be written, a title and a line stand for the frame.
+        inside = inside[2:]
     ends = [place for place, line in enumerate(inside) if _RULE.match(line)]
     if not ends:
         return None
@@ -85,13 +89,9 @@ def _reworded(text: str, said: list[str], rest: list[str]) -> str:
         return _not_one_of(match["name"], match["value"], known)
     if match := _UNION.search(text):
         kinds = [kind for kind in match["kinds"].split("|") if kind != "{None}"]
-        choices = [
-            word
-            for kind in kinds
-            if kind.startswith("{")
-            for word in kind.strip("{}").split(",")
-            if word != "None"
-        ]
+        # The parser holds them in a set, which has no order.
+        words = {word for kind in kinds if kind[0] == "{" for word in kind.strip("{}").split(",")}
+        choices = sorted(words - {"None"})
         if choices:
             return _not_one_of(match["name"], match["value"], choices)
         allowed = " or ".join(_KINDS.get(kind, kind) for kind in kinds)

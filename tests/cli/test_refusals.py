@@ -60,3 +60,14 @@ def test_what_is_no_whole_number(text):
 def test_a_power_of_ten_on_the_command_line(built, capsys):
     assert main(["evolvability", str(built), "--l", "2e0", "--lineages", "1e1", "--draws", "2"]) == 0
     assert "10 lineages of 2 generations" in capsys.readouterr().out
+
+
+def test_frames_of_colour_and_of_ascii():
+    plain = (
+        " Missing argument \n ----------- \n  Missing value for argument '--l'.\n  ---------\n  For help\n"
+    )
+    framed = (
+        "╭─ Missing argument ─╮\n│ \x1b[1mMissing value for argument '--l'.\x1b[0m │\n│ ───────── │\n╰───╯\n"
+    )
+    for text in (plain, framed):
+        assert sentence(text, "nichechain plot") == "--l needs a value (see nichechain plot --help)"
