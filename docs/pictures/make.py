@@ -88,7 +88,7 @@ def rows_of_t(figure: Figure) -> None:
         "Dirichlet, uniform base": ARCHIVE.chain("dirichlet"),
         "empirical Bayes": CHAIN,
     }
-    axes = figure.subplots(1, 3)
+    axes = figure.subplots(1, 3, gridspec_kw={"wspace": 0.3})
     mesh = None
     for ax, (name, chain) in zip(axes, named.items(), strict=True):
         behavior_axes(ax, ARCHIVE)
@@ -111,7 +111,7 @@ def rows_of_t(figure: Figure) -> None:
         ax.set_title(f"{name}\n{possible} of 400 niches possible", fontsize="medium")
     assert mesh is not None
     figure.colorbar(mesh, ax=axes, label="probability of a child's niche", shrink=0.8)
-    figure.suptitle(f"The row of niche {CHAIN.label(state)}: 12 births", y=1.02)
+    figure.suptitle(f"The row of niche {CHAIN.label(state)}: 12 births", y=0.95)
 
 
 def transitions(figure: Figure) -> None:

@@ -18,7 +18,7 @@ from nichechain.core.files import write_atomically
 from nichechain.domains.watching import Film, Motion, watch
 from nichechain.niches import Niche
 from nichechain.plots.cells import borders, frame
-from nichechain.plots.style import EDGE, INK, LONG_JUMP, axes_of, behavior_axes, key
+from nichechain.plots.style import EDGE, INK, LONG_JUMP, axes_of, behavior_axes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -145,7 +145,7 @@ def plot_motion(
     for (name, track), color in zip(motion.tracks.items(), _colors(len(motion.tracks)), strict=True):
         ax.plot(*track[: last + 1].T, color=color, linewidth=1.8, zorder=5, label=name)
         ax.plot(*track[0], "o", markersize=6, markerfacecolor="white", markeredgecolor=color, zorder=6)
-        ax.plot(*track[last], "o", markersize=8, color=color, markeredgecolor="white", zorder=7)
+        ax.plot(*track[last], "o", markersize=8, color=color, markeredgecolor="white", zorder=9)
     behavior_axes(ax, archive)
     (left, right), (bottom, top) = archive.niches.bounds
     places = np.concatenate([*motion.tracks.values(), *([] if motion.limbs is None else motion.limbs)])
@@ -153,7 +153,7 @@ def plot_motion(
     low, high = np.minimum(places.min(axis=0), (left, bottom)), np.maximum(places.max(axis=0), (right, top))
     air = 0.03 * (high - low)
     ax.set(xlim=(low[0] - air[0], high[0] + air[0]), ylim=(low[1] - air[1], high[1] + air[1]))
-    key(ax)
+    ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.13), ncols=3, frameon=False)
     return ax
 
 

@@ -198,7 +198,7 @@ def _arrows(ax: Axes, graph: nx.DiGraph, edges: list[tuple[int, int]], color: st
 
 _BEND = 0.15
 _MOST_LABELS = 12
-_LABELS_AT = (0.5, 0.3, 0.68)
+_LABELS_AT = (0.35, 0.65)
 
 
 def plot_wormholes(archive: Archive, found: pd.DataFrame, ax: Axes | None = None) -> Axes:

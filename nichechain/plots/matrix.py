@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import textwrap
 from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import sparse
 
 from nichechain.core.errors import NichechainError
+from nichechain.core.text import some
 from nichechain.niches import GridNiches
 from nichechain.plots.cells import cells_along
 from nichechain.plots.style import EMPTY, INK, axes_of, colorbar, plain
@@ -21,6 +23,8 @@ if TYPE_CHECKING:
 
 # Probabilities below this are left white.
 _SMALLEST = 1e-3
+# Letters of a line of the title.
+_TITLE = 54
 
 
 def plot_transitions(archive: Archive, chain: NicheChain, ax: Axes | None = None) -> Axes:
@@ -72,7 +76,12 @@ def plot_transitions(archive: Archive, chain: NicheChain, ax: Axes | None = None
             axis(border + 0.5, color=EMPTY, linewidth=0.6, zorder=0.5)
     colorbar(ax, picture, f"probability (white: under {_SMALLEST:g})")
     ax.set_title(
-        f"T: {rows.size} rows with births, {columns.size} states visited\n{chain.estimator}",
+        "\n".join(
+            [
+                f"T: {some(rows.size, 'row')} with births, {some(columns.size, 'state')} visited",
+                *textwrap.wrap(chain.estimator, _TITLE),
+            ]
+        ),
         fontsize="medium",
     )
     ax.tick_params(length=2, color=INK)
