@@ -50,20 +50,23 @@ class ReachParents:
         self._filled[len(niches) :] = True
         self._forecast: Floats | None = None
         self._next: Floats = np.zeros(niches.states)
-        self._expected: dict[int, float] = {}
-        self._found: dict[int, int] = {}
+        # Of each parent, by its number.
+        self._expected: Floats = np.zeros(0)
+        self._found: Floats = np.zeros(0)
 
     def tell(self, births: Told) -> None:
         """What became of some births."""
         self._chain.tell(births)
-        rows = zip(births.parent_uid.tolist(), births.parent_niche, births.child_niche, strict=True)
-        for uid, parent, child in rows:
-            new = child != NONE and not self._filled[child]
-            if new:
-                self._filled[child] = True
-            if uid != NONE:
-                self._expected[uid] = self._expected.get(uid, 0.0) + float(self._next[parent])
-                self._found[uid] = self._found.get(uid, 0) + int(new)
+        landed = np.flatnonzero(births.child_niche != NONE)
+        niches, first = np.unique(births.child_niche[landed], return_index=True)
+        new = np.zeros(len(births), bool)
+        new[landed[first]] = ~self._filled[niches]
+        self._filled[niches] = True
+        born = births.parent_uid != NONE
+        parent = births.parent_uid[born]
+        self._grow(parent.max(initial=-1) + 1)
+        np.add.at(self._expected, parent, self._next[births.parent_niche[born]])
+        np.add.at(self._found, parent, new[born])
 
     def begin(self, step: int) -> None:
         """Ask the chain again, if it is time to."""
@@ -81,10 +84,17 @@ class ReachParents:
         """Weight of each of some elites, (K,); None before there are births, and once all is filled."""
         if self._forecast is None:
             return None
-        expected = np.array([self._expected.get(one, 0.0) for one in uid.tolist()])
-        found = np.array([self._found.get(one, 0) for one in uid.tolist()])
-        weights = self._forecast[niche] * (found + _BELIEF) / (expected + _BELIEF)
+        self._grow(uid.max(initial=-1) + 1)
+        weights = self._forecast[niche] * (self._found[uid] + _BELIEF) / (self._expected[uid] + _BELIEF)
         return weights if weights.max() > 0.0 else None
+
+    def _grow(self, parents: int) -> None:
+        """Room for parents of numbers below that."""
+        missing = parents - self._found.size
+        if missing > 0:
+            # By half at least, so that it is seldom.
+            more = np.zeros(missing + self._found.size // 2)
+            self._found, self._expected = (np.append(old, more) for old in (self._found, self._expected))
 
 
 def one_lineage(chain: OnlineChain, open_: Floats, entered: Floats, l: int) -> Floats:

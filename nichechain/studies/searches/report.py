@@ -144,11 +144,11 @@ def worth_table(worths: tuple[Worth, ...]) -> Table:
         (
             worth.selection,
             str(worth.runs),
-            shown(worth.births_ratio, 2) if worth.selection != REFERENCE else "1",
+            shown(worth.births_ratio, ".2f") if worth.selection != REFERENCE else "1",
             "" if math.isnan(worth.p) else f"{worth.p:.2g}",
-            shown(worth.filled, 0),
-            shown(worth.quality, 0),
-            shown(worth.offspring_niches, 2),
+            shown(worth.filled, ".0f"),
+            shown(worth.quality, ".3g"),
+            shown(worth.offspring_niches, ".2f"),
         )
         for worth in worths
     )
@@ -169,18 +169,17 @@ def _curiosity_table(worths: tuple[Worth, ...]) -> Table:
     rows = []
     for worth in worths:
         found = dict(worth.curiosity)
-        rows.append((worth.selection, *(shown(found[s], 2) if s in found else "" for s in shares)))
+        rows.append((worth.selection, *(shown(found[s], ".2f") if s in found else "" for s in shares)))
     headings = ("selection", *(f"after {share:.0%} of the births" for share in shares))
     return Table("Rank correlation of curiosity and 5-evolvability.", headings, tuple(rows))
 
 
-def shown(mean: Mean, digits: int) -> str:
-    """A mean and its interval, nothing where there is none."""
+def shown(mean: Mean, form: str) -> str:
+    """A mean and its interval in some format, nothing where there is none."""
     if math.isnan(mean.value):
         return ""
-    if math.isnan(mean.interval.low):
-        return f"{mean.value:.{digits}f}"
-    return f"{mean.value:.{digits}f} ({mean.interval.low:.{digits}f} to {mean.interval.high:.{digits}f})"
+    low, high = mean.interval.low, mean.interval.high
+    return f"{mean.value:{form}}" + ("" if math.isnan(low) else f" ({low:{form}} to {high:{form}})")
 
 
 def _figure(study: SelectionStudy, worths: tuple[Worth, ...], records: pa.Table) -> Figure:
