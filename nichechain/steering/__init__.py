@@ -21,8 +21,8 @@ from nichechain.steering.reach import ReachParents
 __all__ = ["make_selection"]
 
 _SHARPENED = 0.3
-"""Temperature of selections that ask the chain: of 1, 0.5, 0.3 and 0.2 the one that needed the fewest births
-on arms and maps of other seeds than those of the study."""
+"""Temperature of selections that ask the chain. In trials of ``reach`` on arms and maps, 0.5, 0.3 and 0.2
+were about as good as each other, and better than 1."""
 
 _L, _LINEAGES = 5, 100
 
