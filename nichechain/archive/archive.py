@@ -78,6 +78,7 @@ class Archive:
     def __init__(self, folder: Path, domain: Domain | None = None) -> None:
         self.folder = folder
         self._domain = domain
+        self._steps: tuple[int, int] | None = None
         self.meta, state = read.read_commit(folder)
         self.config: BuildConfig = self.meta.config
         self.niches: Niches = read.read_niches(folder, self.meta)
@@ -200,6 +201,9 @@ class Archive:
         frame = read.read_births(self.folder, self.meta).to_pandas(use_threads=False, types_mapper=_nullable)
         names = {f"behavior_{i}": f"behavior_{name}" for i, name in enumerate(self.meta.facts.behavior_names)}
         frame = frame.rename(columns=names)
+        if self._steps is not None:
+            first, end = self._steps
+            frame = frame[(frame["step"] >= first) & (frame["step"] < end)].reset_index(drop=True)
         frame.attrs[ATTRIBUTE] = to_plain(self.niches)
         return frame
 
@@ -210,10 +214,33 @@ class Archive:
             return None
         return orphan_note(read.read_births(self.folder, self.meta, ["parent_niche", "step"]))
 
+    def during(self, steps: tuple[int, int]) -> Archive:
+        """The same archive, of whose births only those of some steps are read; its elites stay.
+
+        Parameters
+        ----------
+        steps : (int, int)
+            From the first of these steps of the search up to, and without, the second.
+
+        Returns
+        -------
+        Archive
+            Its births, counts and chain are those of the window.
+
+        Raises
+        ------
+        NichechainError
+            If the window is empty, or births do not say their step.
+        """
+        seen = Archive(self.folder, self._domain)
+        seen.__dict__["counts"] = self.counts_of(steps=steps)
+        seen._steps = steps
+        return seen
+
     @cached_property
     def counts(self) -> TransitionCounts:
         """Births from niche to niche."""
-        return self.counts_of()
+        return self.counts_of(steps=self._steps)
 
     def counts_of(
         self,

@@ -42,6 +42,7 @@ class EstimateCommand:
     """For --stability: niches with fewer births behind their row of T are not ranked."""
     out: Annotated[Path | None, parsing.option("FILE", "none")] = None
     """For --stability: a picture of it, .png, .svg or .pdf."""
+    steps: parsing.Steps = None
     seed: int = 0
     """Of folds, thinning and draws."""
     format: Literal["table", "csv", "json"] = "table"
@@ -54,7 +55,7 @@ def run(arguments: Sequence[str]) -> int:
     _check(command)
     from nichechain.archive.archive import load
 
-    archive = load(command.path)
+    archive = parsing.seen(load(command.path), command.steps)
     if command.compare:
         _compare(command, archive)
     elif command.stability:
@@ -224,7 +225,7 @@ def _course(command: EstimateCommand, archive: Archive) -> LevelCourse | None:
     from nichechain.evolvability.question import MOST_EXACT
     from nichechain.validation.drift import level_course
 
-    if archive.niches.states > MOST_EXACT:
+    if command.steps is not None or archive.niches.states > MOST_EXACT:
         return None
     births = read_births(archive.folder, archive.meta)
     posterior = archive.chain().posterior

@@ -61,6 +61,7 @@ class EvolvabilityCommand:
     """Interval over posterior draws, band over other priors, or bootstrap over each niche's elites."""
     repeats: int = 100
     """Simulations, for --method monte-carlo."""
+    steps: parsing.Steps = None
     seed: int = 0
     """Seed of draws, simulations and offspring."""
     workers: Annotated[str | None, parsing.option("WORKERS", "one thread per processor")] = None
@@ -83,7 +84,7 @@ def run(arguments: Sequence[str]) -> int:
     from nichechain.evolvability.question import Question
 
     Question(command.l, command.lineages)
-    archive = load(command.path)
+    archive = parsing.seen(load(command.path), command.steps)
     chain = archive.chain(command.estimator, unvisited=command.unvisited)
     if command.niche is not None or command.elite is not None:
         frame = _one(command, archive, chain)
@@ -231,7 +232,7 @@ def _drift(command: EvolvabilityCommand, archive: Archive, chain: NicheChain) ->
     from nichechain.validation.drift import level_drift
 
     # Beyond, a level in closed form would take longer than what was asked for.
-    if command.format != "table" or archive.niches.states > MOST_EXACT:
+    if command.steps is not None or command.format != "table" or archive.niches.states > MOST_EXACT:
         return ""
     births = read_births(archive.folder, archive.meta)
     law = None if chain.posterior is None else chain.posterior.law

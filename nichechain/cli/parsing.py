@@ -13,6 +13,7 @@ from nichechain.cli import refusals
 from nichechain.core.errors import NichechainError
 
 if TYPE_CHECKING:
+    from nichechain.archive.archive import Archive
     from nichechain.core.checks import DomainOption
 
 Command = TypeVar("Command")
@@ -35,6 +36,14 @@ Workers: TypeAlias = Annotated[
         help="Who evaluates: a number of threads, processes:N, ray or ray://HOST:PORT. "
         "The result is the same.",
         help_behavior_hint="(default: one thread per processor)",
+    ),
+]
+Steps: TypeAlias = Annotated[
+    str | None,
+    tyro.conf.arg(
+        metavar="FROM:TO",
+        help="Only births from step FROM of the search up to, and without, step TO; either may be left out.",
+        help_behavior_hint="(default: all)",
     ),
 ]
 CacheMemory: TypeAlias = Annotated[
@@ -125,6 +134,26 @@ def whole(text: str) -> int:
     if len(behind) > power:
         raise ValueError(f"invalid literal for int(): {text!r}")
     return int(f"{digits}{behind}{'0' * (power - len(behind))}")
+
+
+def seen(archive: Archive, steps: str | None) -> Archive:
+    """The archive, or its window of the steps that ``--steps`` names.
+
+    Raises
+    ------
+    NichechainError
+        If the text names no window, or the archive has no births in it.
+    """
+    if steps is None:
+        return archive
+    match = re.fullmatch(r"(\d*):(\d*)", steps.strip())
+    window = (int(match[1] or 0), int(match[2] or 2**31 - 1)) if match else (0, 0)
+    if window[0] >= window[1]:
+        raise NichechainError(f"--steps is {steps!r}, but must be a window FROM:TO, such as 0:100")
+    found = archive.during(window)
+    if not found.counts.births.sum():
+        raise NichechainError(f"--steps is {steps!r}, but must be a window with births of parents in it")
+    return found
 
 
 def called(command: Callable[..., Command]) -> str:

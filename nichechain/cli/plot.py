@@ -67,6 +67,7 @@ class PlotCommand:
     """How T is estimated; classes are always those of mle, as a posterior has no zeros."""
     min_births: int = 20
     """Niches with fewer births behind their row of T are crossed out, for evolvability."""
+    steps: parsing.Steps = None
     dpi: int = 200
     """Resolution of a .png."""
 
@@ -87,7 +88,7 @@ def run(arguments: Sequence[str]) -> int:
         raise NichechainError("--niche is missing, but reach is drawn from a niche, such as --niche 7,11")
     if command.niche is not None and command.kind not in ("reach", "growth"):
         raise NichechainError(f"--niche belongs to reach and growth, not to {command.kind}")
-    archive = load(command.path)
+    archive = parsing.seen(load(command.path), command.steps)
     axes = len(archive.niches.bounds)
     if command.kind in _MAPS and axes > 2:
         # Before anything is computed for a map that cannot be drawn.

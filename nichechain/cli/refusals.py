@@ -86,6 +86,9 @@ def sentence(framed: str, name: str) -> str | None:
 def _reworded(text: str, said: list[str], rest: list[str]) -> str:
     if match := _CHOICE.search(text):
         known = [word.strip(" '") for word in match["known"].split(",") if word.strip()]
+        if "None" in known:
+            # Where nothing is a choice too, the parser holds them in a set, which has no order.
+            known = sorted(set(known) - {"None"})
         return _not_one_of(match["name"], match["value"], known)
     if match := _UNION.search(text):
         kinds = [kind for kind in match["kinds"].split("|") if kind != "{None}"]

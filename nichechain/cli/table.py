@@ -48,6 +48,7 @@ class TableCommand:
     """Recorded children that an elite needs for its ratio r*."""
     draws: int = 50
     """Posterior draws of T to average over."""
+    steps: parsing.Steps = None
     seed: int = 0
     """Seed of the draws."""
     format: Literal["table", "csv", "json"] = "table"
@@ -67,7 +68,7 @@ def run(arguments: Sequence[str]) -> int:
     from nichechain.landscape.niche_table import niche_table
 
     Question(command.l, command.lineages)
-    archive = load(command.path)
+    archive = parsing.seen(load(command.path), command.steps)
     draws = 1 if command.estimator == "mle" else command.draws
     with progress.counting(draws, "draws of T") as tell:
         frame = niche_table(

@@ -42,7 +42,6 @@ def niche_table(
     l: int = 5,
     lineages: int = 100,
     estimator: str = "empirical-bayes",
-    steps: tuple[int, int] | None = None,
     children: int = FEWEST_CHILDREN,
     draws: int = DRAWS,
     seed: int = 0,
@@ -56,8 +55,6 @@ def niche_table(
     l, lineages, draws, seed
         As in :func:`nichechain.niche_evolvability`.
     estimator : {"empirical-bayes", "dirichlet", "mle"}
-    steps : (int, int), optional
-        Only births from the first of these steps of the search up to, and without, the second.
     children : int
         So many recorded children must an elite have for its r*, at least 2.
     tell : callable, optional
@@ -76,7 +73,7 @@ def niche_table(
     Raises
     ------
     NichechainError
-        If an argument is out of range, or births do not say their step and are chosen by it.
+        If an argument is out of range.
 
     Notes
     -----
@@ -87,7 +84,7 @@ def niche_table(
     """
     check_at_least(2, children=children)
     question = Question(l, lineages, draws=draws, seed=seed)
-    counts = archive.counts if steps is None else archive.counts_of(steps=steps)
+    counts = archive.counts
     chain = estimate(counts, estimator)  # type: ignore[arg-type]
     n = len(archive.niches)
     there = np.flatnonzero(counts.visits[:n] > 0)
@@ -100,8 +97,7 @@ def niche_table(
         }
     )
     births = archive.births()
-    chosen = births if steps is None else births[(births["step"] >= steps[0]) & (births["step"] < steps[1])]
-    frame = frame.join(_curiosity(chosen), on="niche")
+    frame = frame.join(_curiosity(births), on="niche")
     if there.size:
         scores = answer_for_niches(chain, question, roots=there, tell=tell)
         for name in ("value", "low", "high"):

@@ -78,8 +78,8 @@ def plot_visits(archive: Archive, ax: Axes | None = None) -> Axes:
     largest = np.nanmax(visits) if np.isfinite(visits).any() else 1.0
     mesh = _map(ax, archive, visits, "viridis", LogNorm(1.0, max(2.0, largest)))
     colorbar(ax, mesh, "births")
-    births, outside = archive.meta.births, archive.counts.births_outside
-    ax.set_title(f"{some(births, 'birth')}, {outside / births:.0%} outside")
+    births, outside = int(archive.counts.visits.sum()), archive.counts.births_outside
+    ax.set_title(f"{some(births, 'birth')}, {outside / max(1, births):.0%} outside")
     key(ax)
     return ax
 

@@ -29,6 +29,7 @@ _NICHE = ("9,9", "-1", "a", "0,", "0;0", "1,2,3", "999", "")
 _GRID = ("0x2", "2", "axb", "2x", "-1x2", "1000000x1000000", "2x2x2", "")
 _BOUNDS = ("0,1", "1,0,0,1", "0,nan,0,1", "a,b,c,d", "0,1,0", "")
 _PATH = ("/no/such/folder", "no-such-archive")
+_STEPS = ("3:1", "0:0", "-1:2", "three", "9999:", "")
 _SCORES = {"l": _COUNT, "lineages": _COUNT, "seed": _NATURAL}
 _ESTIMATOR = {"estimator": _UNKNOWN}
 
@@ -135,6 +136,7 @@ TABLE: tuple[tuple[str, str, tuple[str, ...], Bad], ...] = (
         ("{archive}",),
         {
             "path": _PATH,
+            "steps": _STEPS,
             "estimator": _UNKNOWN,
             "min_births": _NATURAL,
             "seed": _NATURAL,
@@ -164,6 +166,7 @@ TABLE: tuple[tuple[str, str, tuple[str, ...], Bad], ...] = (
         ("{archive}", "--draws", "2"),
         {
             "path": _PATH,
+            "steps": _STEPS,
             "niche": _NICHE,
             "elite": _NICHE,
             "top": _COUNT,
@@ -273,6 +276,7 @@ TABLE: tuple[tuple[str, str, tuple[str, ...], Bad], ...] = (
         ("{archive}", "reach", "--niche", "{niche}", "--out", "{fresh}.png"),
         {
             "path": _PATH,
+            "steps": _STEPS,
             "kind": _UNKNOWN,
             "out": ("file.txt", "/no/such/folder/file.png", "file"),
             "l": _COUNT,
@@ -363,6 +367,7 @@ TABLE: tuple[tuple[str, str, tuple[str, ...], Bad], ...] = (
         ("{archive}", "--draws", "2"),
         {
             "path": _PATH,
+            "steps": _STEPS,
             "by": _UNKNOWN,
             "top": _COUNT,
             "children": ("1", *_COUNT),

@@ -130,7 +130,6 @@ CALLS = (
         {
             **LINEAGES,
             "estimator": UNKNOWN,
-            "steps": ((3, 1), (-1, 2), (0.5, 2), (1,)),
             "children": whole(1),
             "draws": whole(0),
         },

@@ -63,7 +63,7 @@ def test_ratios_are_those_of_recorded_children(arm_archive, table):
 def test_a_window_of_steps(arm_archive):
     births = arm_archive.births()
     end = int(births["step"].max())
-    early = niche_table(arm_archive, **ASKED, steps=(0, end))
+    early = niche_table(arm_archive.during((0, end)), **ASKED)
     inside = births[(births["step"] < end) & (births["child_niche"] < len(arm_archive.niches))]
     assert early["visits"].sum() == len(inside)
 
