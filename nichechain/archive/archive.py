@@ -59,6 +59,23 @@ class Elite:
     uid: int
     depth: int
 
+    def __repr__(self) -> str:
+        place = "outside" if self.niche is None else f"niche {self.niche}"
+        return f"Elite({place}: {', '.join(f'{name} {value}' for name, value in self._facts().items())})"
+
+    def _repr_html_(self) -> str:
+        return facts_table("Elite", {"niche": self.niche or "outside", **self._facts()})
+
+    def _facts(self) -> dict[str, object]:
+        behavior = ", ".join(f"{value:.4g}" for value in self.behavior)
+        return {
+            "behavior": f"({behavior})",
+            "objective": f"{self.objective:.4g}",
+            "birth": self.uid,
+            "depth": self.depth,
+            "genotype": f"of {self.genotype.size} parameters",
+        }
+
 
 class Archive:
     """The last commit of an archive folder, read-only.

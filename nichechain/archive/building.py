@@ -12,7 +12,9 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from nichechain.archive import read, write
+from nichechain.archive.archive import Archive
 from nichechain.archive.filling import BuildProgress, Filling, count
+from nichechain.archive.notebook import bar_in_notebook
 from nichechain.births.table import NONE
 from nichechain.core.errors import ArchiveError
 from nichechain.core.files import writing
@@ -36,7 +38,7 @@ def build(
     domain: Domain | None = None,
     on_progress: Callable[[BuildProgress], None] | None = None,
     max_failed: float = MOST_FAILED,
-) -> None:
+) -> Archive:
     """Fill an archive folder, going on from what it holds.
 
     Commits every half minute, or less often if that would take more than a hundredth of the time,
@@ -55,8 +57,14 @@ def build(
     domain : Domain, optional
         By default the one that the configuration names.
     on_progress : callable, optional
+        Told how far it is; by default a notebook shows a bar.
     max_failed : float
         Share of births that may fail, from 0 to 1, once there are a hundred.
+
+    Returns
+    -------
+    Archive
+        What the folder then holds.
 
     Raises
     ------
@@ -69,6 +77,7 @@ def build(
     """
     failures = Failures(max_failed)
     folder = Path(folder)
+    given = domain
     domain = domain or make_domain(config)
     domain, mutate = make_mutation(config, domain)
     with writing(folder):
@@ -111,8 +120,11 @@ def build(
                 # Of whoever called build(), with Filling between.
                 warnings.warn(note, stacklevel=4)
 
-        filling = Filling(folder, search, writer, failures, outside, len(niches), on_progress)
-        filling.go(config.evaluations, executor, look)
+        with bar_in_notebook(config.evaluations) as bar:
+            tell = on_progress or bar
+            filling = Filling(folder, search, writer, failures, outside, len(niches), tell)
+            filling.go(config.evaluations, executor, look)
+    return Archive(folder, given)
 
 
 def _landed(rows: pa.Table) -> tuple[NDArray[np.float64], NDArray[np.int64]]:

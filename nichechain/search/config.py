@@ -224,6 +224,14 @@ class BuildConfig(SearchConfig):
             check_positive(temperature=self.temperature)
             object.__setattr__(self, "temperature", float(self.temperature))
 
+    def _repr_html_(self) -> str:
+        from nichechain.core.notebook import facts_table
+
+        usual = {field.name: field.default for field in fields(self)}
+        # What is as always would hide what is not.
+        told = {name: value for name, value in self.to_json().items() if value != usual[name]}
+        return facts_table("BuildConfig", {name: value for name, value in told.items() if value != {}})
+
     def to_json(self) -> dict[str, Any]:
         """Plain values for JSON; as before grids had an epsilon, where it is the usual one."""
         values = asdict(self)
