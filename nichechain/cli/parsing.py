@@ -147,7 +147,9 @@ def seen(archive: Archive, steps: str | None) -> Archive:
     if steps is None:
         return archive
     match = re.fullmatch(r"(\d*):(\d*)", steps.strip())
-    window = (int(match[1] or 0), int(match[2] or 2**31 - 1)) if match else (0, 0)
+    # Steps are stored in 32 bits.
+    last = 2**31 - 1
+    window = (min(int(match[1] or 0), last), min(int(match[2] or last), last)) if match else (0, 0)
     if window[0] >= window[1]:
         raise NichechainError(f"--steps is {steps!r}, but must be a window FROM:TO, such as 0:100")
     found = archive.during(window)
