@@ -325,6 +325,7 @@ TABLE: tuple[tuple[str, str, tuple[str, ...], Bad], ...] = (
             "selection_lineages": _COUNT,
             "lineage_share": ("1", *_SHARE),
             "lineage_length": ("1", *_COUNT),
+            "lineage_brood": _COUNT,
             "replacement": _UNKNOWN,
             "outside": _UNKNOWN,
             "seed": _NATURAL,
