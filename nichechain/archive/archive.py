@@ -325,11 +325,10 @@ def shipped() -> tuple[str, ...]:
 
 def _shipped(path: Path) -> Path | None:
     """A shipped archive called by its name, with or without ``archives/`` before it."""
-    if len(path.parts) > 2 or (len(path.parts) == 2 and path.parts[0] != "archives"):
-        return None
-    for root in _shipped_roots():
-        if read.is_archive(root / path.name):
-            return root / path.name
+    if len(path.parts) == 1 or (len(path.parts) == 2 and path.parts[0] == "archives"):
+        for root in _shipped_roots():
+            if read.is_archive(root / path.name):
+                return root / path.name
     if len(path.parts) == 1 and shipped():
         own = [str(entry) for entry in Path("archives").glob("*") if read.is_archive(entry)]
         near = did_you_mean(str(path), shipped()) or did_you_mean(f"archives/{path}", own)
@@ -338,7 +337,7 @@ def _shipped(path: Path) -> Path | None:
             f"({', '.join(shipped())}){near}"
         )
     near = did_you_mean(str(path), [str(entry) for entry in path.parent.glob("*") if read.is_archive(entry)])
-    if near:
+    if near and not path.exists():
         raise ArchiveError(f"{path} is no archive: there is no such folder{near}")
     return None
 

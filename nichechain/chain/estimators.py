@@ -157,7 +157,9 @@ def _empirical_bayes(counts: TransitionCounts, strength: float | None) -> NicheC
     typical = (births * effect).sum() / max(1, births.sum())
     related = f", {typical:.2g} births count as one" if typical >= 1.05 else ""
     law = posterior.law
-    checked = "" if law is None else f", calibrated on lineages of {law.broods} elites"
+    checked = (
+        "" if law is None else f", calibrated on lineages of {law.broods} elite{'s' * (law.broods != 1)}"
+    )
     name = f"empirical-bayes, strength {prior.strength:.3g}{related}{checked}"
     return with_posterior(counts, posterior, name)
 

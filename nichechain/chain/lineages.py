@@ -143,7 +143,8 @@ def fitted_law(posterior: DirichletPosterior) -> LineageLaw | None:
         difference = broods.simulated(urns, rng).mean(axis=1) - broods.reached
         spread = difference.std(ddof=1) if difference.size > 1 else 0.0
         off.append(difference.mean())
-        known.append(max(spread, _LEAST_SPREAD * broods.reached.mean()) / np.sqrt(difference.size))
+        least = max(_LEAST_SPREAD * broods.reached.mean(), _LEAST_DEVIATION)
+        known.append(max(spread, least) / np.sqrt(difference.size))
     fine = np.linspace(_LOG_CONCENTRATIONS[0], _LOG_CONCENTRATIONS[-1], _FINE)
     miss = np.interp(fine, _LOG_CONCENTRATIONS, off) / np.interp(fine, _LOG_CONCENTRATIONS, known)
     likely = np.exp(-0.5 * (miss**2 + ((fine - _EXPECTED) / _SPREAD) ** 2))

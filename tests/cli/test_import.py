@@ -9,6 +9,26 @@ from nichechain.cli import main
 
 
 @pytest.fixture(scope="module")
+def built(tmp_path_factory):
+    """An archive without births of lineages, which a log cannot tell from others."""
+    folder = tmp_path_factory.mktemp("plain") / "arm"
+    asked = [
+        "--evaluations",
+        "1500",
+        "--grid",
+        "8x8",
+        "--scale",
+        "0.3",
+        "--seed",
+        "5",
+        "--lineage-share",
+        "0",
+    ]
+    assert main(["build", "arm", *asked, "--out", str(folder)]) == 0
+    return folder
+
+
+@pytest.fixture(scope="module")
 def log(built, tmp_path_factory):
     path = tmp_path_factory.mktemp("import") / "log.csv"
     nc.load(built).births().to_csv(path, index=False)
