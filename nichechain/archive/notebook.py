@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -11,14 +12,16 @@ from nichechain.archive.filling import BuildProgress
 
 @contextmanager
 def bar_in_notebook(total: int) -> Iterator[Callable[[BuildProgress], None] | None]:
-    """A bar of births under the cell that runs; None where there is no notebook to show one in.
+    """A bar of births under the cell that runs; None where there is no notebook, or nothing
+    to show one with.
 
     Parameters
     ----------
     total : int
         Births that there will be.
     """
-    if not in_notebook():
+    # Rich draws a bar there by means of ipywidgets, and warns where they are missing.
+    if not in_notebook() or importlib.util.find_spec("ipywidgets") is None:
         yield None
         return
     from rich.progress import Progress
