@@ -12,8 +12,7 @@ from nichechain.archive.filling import BuildProgress
 
 @contextmanager
 def bar_in_notebook(total: int) -> Iterator[Callable[[BuildProgress], None] | None]:
-    """A bar of births under the cell that runs; None where there is no notebook, or nothing
-    to show one with.
+    """A bar of births under the cell that runs; None where there is no notebook or nothing to show it.
 
     Parameters
     ----------
