@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import textwrap
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -83,7 +84,7 @@ def behavior_axes(ax: Axes, archive: Archive, *, strip: bool = True) -> None:
     ax.tick_params(length=3, color=INK)
     for spine in ax.spines.values():
         spine.set_color("#999999")
-    if facts.start is not None:
+    if facts.start is not None and _near(facts.start, archive.niches.bounds):
         ax.plot(
             *on_map(facts.start),
             marker="P",
@@ -152,3 +153,12 @@ def key(ax: Axes, *handles: Any, note: str | None = None) -> None:
             lines = [line for part in note.split("\n") for line in textwrap.wrap(part, _NOTE)]
             legend.set_title("\n".join(lines))
             legend.get_title().set(fontsize="small", color="#555555")
+
+
+def _near(place: Sequence[float], bounds: Sequence[tuple[float, float]]) -> bool:
+    """Whether a place is on the map, or beside it by no more than a tenth of its size."""
+    margin = 0.1
+    return all(
+        low - margin * (high - low) <= at <= high + margin * (high - low)
+        for at, (low, high) in zip(place, bounds, strict=False)
+    )

@@ -170,6 +170,8 @@ class BuildConfig(SearchConfig):
     domain_options: Mapping[str, DomainOption] = field(default_factory=dict, hash=False)
 
     def __post_init__(self) -> None:
+        if not isinstance(self.domain, str):
+            raise NichechainError(f"domain is {self.domain!r}, but must be the name of a domain")
         asked = [name for name in ("selection_l", "selection_lineages") if getattr(self, name) is not None]
         whole = (
             *("evaluations", "initial", "batch", "seed", "domain_seed", "niches_seed"),
