@@ -97,7 +97,7 @@ class LineageLaw:
         if isinstance(transition, np.ndarray):
             tilted = transition.copy()
             tilted[np.diag_indices_from(tilted)] *= np.exp(stay)
-            return _redrawn(tilted / tilted.sum(axis=1, keepdims=True), concentration, rng)
+            return scattered_rows(tilted / tilted.sum(axis=1, keepdims=True), concentration, rng)
         kept = transition.kept if isinstance(transition, PooledTransition) else transition
         more = kept.diagonal() * np.expm1(stay)
         scale = 1.0 / (1.0 + more)
@@ -164,11 +164,6 @@ def urns_of(posterior: DirichletPosterior, rng: np.random.Generator) -> Urns:
     stay, concentration = posterior.law.drawn(rng)
     later = rows.with_stay(_base_stay(settled), stay).scattered(concentration)
     return Urns(settled, rows.scattered(posterior.elite_concentration), later)
-
-
-def scattered_rows(rows: Floats, concentration: float, rng: np.random.Generator) -> Floats:
-    """Distributions drawn around some, Dirichlet(τ p), (..., S)."""
-    return _redrawn(rows, concentration, rng)
 
 
 def _latest(table: Ints) -> Ints:
@@ -244,7 +239,8 @@ class _Broods:
         return found
 
 
-def _redrawn(rows: Floats, concentration: float, rng: np.random.Generator) -> Floats:
+def scattered_rows(rows: Floats, concentration: float, rng: np.random.Generator) -> Floats:
+    """Distributions drawn around some, Dirichlet(τ p), (..., S)."""
     weight = rng.standard_gamma(concentration * rows)
     total = weight.sum(axis=-1, keepdims=True)
     drawn: Floats = np.where(total > _TINY, weight / np.maximum(total, _TINY), rows)

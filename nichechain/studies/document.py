@@ -6,6 +6,10 @@ import base64
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
+from pathlib import Path
+
+from nichechain.core.errors import NichechainError
+from nichechain.core.files import write_atomically
 
 _CSS = """
 :root { color-scheme: light; }
@@ -161,3 +165,20 @@ def _flat(text: str) -> str:
         text = text.replace(mark, f"\\{mark}")
     text = text.replace("](", "]\\(")
     return " ".join(text.split())
+
+
+def write_files(folder: str | Path, files: Mapping[str, bytes]) -> None:
+    """Write the files of a report, each whole or not at all.
+
+    Raises
+    ------
+    NichechainError
+        If they cannot be written.
+    """
+    folder = Path(folder)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for name, data in files.items():
+            write_atomically(folder / name, data)
+    except OSError as error:
+        raise NichechainError(f"the report cannot be written to {folder}: {error}") from error

@@ -11,12 +11,11 @@ from typing import TYPE_CHECKING, Any
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from nichechain.core.errors import NichechainError
-from nichechain.core.files import write_atomically
 from nichechain.core.intervals import LEVEL
 from nichechain.core.machine import library_versions, machine
 from nichechain.studies import findings
 from nichechain.studies.analysis import Analysis, analyse, plain, varied
+from nichechain.studies.document import write_files
 from nichechain.studies.statistics import RESAMPLES
 from nichechain.studies.study import Study
 from nichechain.studies.wording import compose, title
@@ -87,13 +86,7 @@ def write_report(
         PAGE: document.html({FIGURE: picture}).encode(),
         STATISTICS: (json.dumps(statistics, indent=1, ensure_ascii=False) + "\n").encode(),
     }
-    folder = Path(folder)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        for name, data in files.items():
-            write_atomically(folder / name, data)
-    except OSError as error:
-        raise NichechainError(f"the report cannot be written to {folder}: {error}") from error
+    write_files(folder, files)
     return analysis
 
 

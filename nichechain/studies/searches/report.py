@@ -12,11 +12,18 @@ from typing import TYPE_CHECKING, Any
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from nichechain.core.errors import NichechainError
-from nichechain.core.files import write_atomically
 from nichechain.core.machine import library_versions
 from nichechain.studies.analysis import plain
-from nichechain.studies.document import Bullets, Code, Document, Heading, Paragraph, Picture, Table
+from nichechain.studies.document import (
+    Bullets,
+    Code,
+    Document,
+    Heading,
+    Paragraph,
+    Picture,
+    Table,
+    write_files,
+)
 from nichechain.studies.searches.comparing import Mean, Worth, compare_selections
 from nichechain.studies.searches.study import REFERENCE, SelectionStudy
 
@@ -72,13 +79,7 @@ def write_selection_report(
         PAGE: document.html({FIGURE: picture}).encode(),
         STATISTICS: (json.dumps(statistics, indent=1, ensure_ascii=False) + "\n").encode(),
     }
-    folder = Path(folder)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        for name, data in files.items():
-            write_atomically(folder / name, data)
-    except OSError as error:
-        raise NichechainError(f"the report cannot be written to {folder}: {error}") from error
+    write_files(folder, files)
     return worths
 
 
