@@ -47,6 +47,7 @@ def test_two_states_that_are_hardly_ever_left():
 
 
 def test_pairs_that_swap_are_the_groups_in_which_lineages_stay():
+    pytest.importorskip("pygpcca")
     pairs = nc.NicheChain([[0, 0.95, 0.05, 0], [0.95, 0, 0, 0.05], [0.05, 0, 0, 0.95], [0, 0.05, 0.95, 0]])
     found = metastable_sets(pairs, 2)
     assert found.group[0] == found.group[1] != found.group[2] == found.group[3]
