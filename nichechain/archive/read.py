@@ -30,7 +30,7 @@ from nichechain.domains.base import Domain
 from nichechain.niches import Niches
 from nichechain.search.config import BuildConfig
 from nichechain.search.elites import Elites, SearchState
-from nichechain.search.lineages import Calibration, UnderWay
+from nichechain.search.lineages import Calibration, Stretch, UnderWay
 from nichechain.search.making import make_niches
 
 FORMAT = 1
@@ -359,6 +359,24 @@ def _check_state(elites: Elites, pending: Offspring, lineages: UnderWay, meta: M
         raise ValueError("its lineages are in no order")
     if (np.diff(elites.niche, prepend=-1) <= 0).any() or (elites.niche > _outside(meta)).any():
         raise ValueError("its elites are in no order, or in niches that do not exist")
+    if ((lineages.niche < 0) | (lineages.niche > _outside(meta))).any():
+        raise ValueError("its lineages are in niches that do not exist")
+    if meta.origin is None and not meta.calibrations:
+        _check_step(pending, meta)
+
+
+def _check_step(pending: Offspring, meta: Meta) -> None:
+    """Refuse births that do not end in the step that a build of that configuration was in."""
+    steps = Stretch.of_build(meta.config)
+    begins, ends = (-1, 0) if meta.step < 0 else steps.uids(meta.step)
+    if not begins < meta.births <= ends:
+        raise ValueError(
+            f"it has {meta.births} births, but step {meta.step} of its build "
+            f"has those from {max(0, begins)} to {ends - 1}"
+        )
+    # Compared by their number first: anybody may have written how many there should be.
+    if len(pending) != ends - meta.births or (np.diff(pending.uid, prepend=meta.births - 1) != 1).any():
+        raise ValueError(f"its children that are not born yet are not those from {meta.births} to {ends - 1}")
 
 
 def read_births(folder: Path, meta: Meta, columns: list[str] | None = None) -> pa.Table:

@@ -116,6 +116,13 @@ class Stretch:
         """Number of the first birth of a step."""
         return self.first_uid + (step - self.first_step) * self.batch
 
+    def uids(self, step: int) -> tuple[int, int]:
+        """Number of the first birth of a step, and the number after that of its last.
+
+        Step 0 of a build has its initial births.
+        """
+        return 0 if step == 0 else self.uid(step), self.uid(step + 1)
+
     def slots(self, step: int) -> tuple[Ints, NDArray[np.bool_]]:
         """The slot of each birth of a step, and whether a lineage goes on there if one is under way.
 

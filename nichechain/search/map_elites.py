@@ -226,7 +226,7 @@ class MapElites:
         )
 
     def _first_uid(self, step: int) -> int:
-        return 0 if step == 0 else self._stretch.uid(step)
+        return self._stretch.uids(step)[0]
 
     def _keep(
         self, offspring: Offspring, evaluation: Evaluation, slot: Ints, of_lineages: NDArray[np.float32]

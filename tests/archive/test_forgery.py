@@ -70,6 +70,8 @@ COMMANDS: tuple[tuple[str, ...], ...] = (
         "2",
         "--l",
         "1",
+        "--out",
+        "{out}/validation",
         "--permutations",
         "3",
         "--workers",

@@ -263,6 +263,21 @@ for folder in sorted(Path(sys.argv[2]).iterdir()):
 """
 
 
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("initial", 2**31), ("initial", 1), ("batch", 2**31), ("batch", 63), ("step", 10**12), ("step", -1)],
+)
+def test_births_end_in_the_step_that_their_build_was_in(
+    name: str, value: int, pristine: dict[str, bytes], tmp_path: Path
+) -> None:
+    def edit(meta: dict[str, Any]) -> None:
+        (meta if name == "step" else meta["config"])[name] = value
+
+    folder = written(tmp_path, edited(pristine, edit))
+    with pytest.raises(ArchiveError, match=r"of its build has|not born yet"):
+        load(folder).elites()
+
+
 def test_claims_are_checked_before_memory_is_given(pristine: dict[str, bytes], tmp_path: Path) -> None:
     good = written(tmp_path / "good", pristine)
     made = bombs(pristine)
