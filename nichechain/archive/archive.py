@@ -17,7 +17,7 @@ from nichechain.archive import read
 from nichechain.archive.trust import check_trusted
 from nichechain.births.orphans import orphan_note
 from nichechain.chain import NicheChain, TransitionCounts, estimate
-from nichechain.chain.filters import counts_of
+from nichechain.chain.filters import counts_of, within_steps
 from nichechain.core.errors import ArchiveError, NichechainError
 from nichechain.core.notebook import facts_table
 from nichechain.core.suggestions import did_you_mean
@@ -29,6 +29,7 @@ from nichechain.search.elites import Elites
 from nichechain.search.making import make_domain, make_mutation
 
 if TYPE_CHECKING:
+    import pyarrow as pa
     from torch import nn
 
 
@@ -95,7 +96,7 @@ class Archive:
     def __init__(self, folder: Path, domain: Domain | None = None) -> None:
         self.folder = folder
         self._domain = domain
-        self._steps: tuple[int, int] | None = None
+        self.steps: tuple[int, int] | None = None
         self.meta, state = read.read_commit(folder)
         self.config: BuildConfig = self.meta.config
         self.niches: Niches = read.read_niches(folder, self.meta)
@@ -215,21 +216,34 @@ class Archive:
 
         The frame knows its niches: ``TransitionCounts.from_births(archive.births())`` needs no more.
         """
-        frame = read.read_births(self.folder, self.meta).to_pandas(use_threads=False, types_mapper=_nullable)
+        frame = self.table().to_pandas(use_threads=False, types_mapper=_nullable)
         names = {f"behavior_{i}": f"behavior_{name}" for i, name in enumerate(self.meta.facts.behavior_names)}
         frame = frame.rename(columns=names)
-        if self._steps is not None:
-            first, end = self._steps
-            frame = frame[(frame["step"] >= first) & (frame["step"] < end)].reset_index(drop=True)
         frame.attrs[ATTRIBUTE] = to_plain(self.niches)
         return frame
+
+    def table(self, columns: list[str] | None = None, *, whole: bool = False) -> pa.Table:
+        """The same as an Arrow table, with axes of behavior numbered.
+
+        Parameters
+        ----------
+        columns : list of str, optional
+            By default all.
+        whole : bool
+            Births of other steps too, where only those :meth:`during` some are asked about.
+        """
+        if self.steps is None or whole:
+            return read.read_births(self.folder, self.meta, columns)
+        read_too = None if columns is None else list(dict.fromkeys([*columns, "step"]))
+        births = within_steps(read.read_births(self.folder, self.meta, read_too), self.steps)
+        return births if columns is None else births.select(columns)
 
     @cached_property
     def orphan_note(self) -> str | None:
         """What to say where most imported births after the first batch have no parent, else None."""
         if not self.meta.imported:
             return None
-        return orphan_note(read.read_births(self.folder, self.meta, ["parent_niche", "step"]))
+        return orphan_note(self.table(["parent_niche", "step"]))
 
     def during(self, steps: tuple[int, int]) -> Archive:
         """The same archive, of whose births only those of some steps are read; its elites stay.
@@ -251,13 +265,13 @@ class Archive:
         """
         seen = Archive(self.folder, self._domain)
         seen.__dict__["counts"] = self.counts_of(steps=steps)
-        seen._steps = steps
+        seen.steps = steps
         return seen
 
     @cached_property
     def counts(self) -> TransitionCounts:
         """Births from niche to niche."""
-        return self.counts_of(steps=self._steps)
+        return self.counts_of(steps=self.steps)
 
     def counts_of(
         self,
@@ -268,8 +282,14 @@ class Archive:
         lineages: bool | None = None,
     ) -> TransitionCounts:
         """Some of the births from niche to niche, see :func:`nichechain.chain.filters.counts_of`."""
-        births = read.read_births(self.folder, self.meta)
-        return counts_of(births, self.niches, run=run, steps=steps, accepted=accepted, lineages=lineages)
+        return counts_of(
+            self.table(whole=steps is not None),
+            self.niches,
+            run=run,
+            steps=steps,
+            accepted=accepted,
+            lineages=lineages,
+        )
 
     def chain(self, estimator: str = "empirical-bayes", **options: Any) -> NicheChain:
         """The Markov chain over niches, estimated from all births.

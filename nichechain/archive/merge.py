@@ -110,7 +110,6 @@ def merge(folders: Sequence[str | Path], out: str | Path) -> None:
 def _runs(paths: list[Path], metas: list[read.Meta]) -> list[dict[str, Any]]:
     """One entry per run of the result, after checking that the archives belong together."""
     runs: list[dict[str, Any]] = []
-    owner: list[Path] = []
     for path, meta in zip(paths, metas, strict=True):
         if meta.imported:
             raise NichechainError(
@@ -123,25 +122,41 @@ def _runs(paths: list[Path], metas: list[read.Meta]) -> list[dict[str, Any]]:
                     f"{paths[0]} has {name} {ours} and {path} has {theirs}, but must have the same"
                 )
         first = sum(run["births"] for run in runs)
-        if meta.origin is None:
-            own: list[dict[str, Any]] = [
-                {"config": meta.config.to_json(), "births": meta.births, "first_uid": 0}
-            ]
-            if meta.calibrations:
-                own[0]["calibrations"] = [asdict(each) for each in meta.calibrations]
-        else:
-            own = meta.origin["runs"]
-        for run in own:
-            for other, whose in zip(runs, owner, strict=True):
-                if _same_search(run["config"], other["config"]):
+        runs += [{**run, "first_uid": first + run["first_uid"]} for run in _runs_of(meta)]
+    check_distinct(paths, metas)
+    return runs
+
+
+def check_distinct(paths: Sequence[Path], metas: Sequence[read.Meta]) -> None:
+    """Refuse two archives that hold the same run; of what was imported nothing is known.
+
+    Raises
+    ------
+    NichechainError
+        If the births of a run would count twice.
+    """
+    seen: list[tuple[Path, dict[str, Any]]] = []
+    for path, meta in zip(paths, metas, strict=True):
+        own = [] if meta.imported else [run["config"] for run in _runs_of(meta)]
+        for config in own:
+            for whose, other in seen:
+                if _same_search(config, other):
                     raise NichechainError(
-                        f"{whose} and {path} both have the run of seed {run['config']['seed']}, "
+                        f"{whose} and {path} both have the run of seed {config['seed']}, "
                         "whose births would count twice"
                     )
-        for run in own:
-            runs.append({**run, "first_uid": first + run["first_uid"]})
-            owner.append(path)
-    return runs
+        seen += [(path, config) for config in own]
+
+
+def _runs_of(meta: read.Meta) -> list[dict[str, Any]]:
+    """The runs of an archive, of which only one that was merged has several."""
+    if meta.origin is not None:
+        runs: list[dict[str, Any]] = meta.origin["runs"]
+        return runs
+    run: dict[str, Any] = {"config": meta.config.to_json(), "births": meta.births, "first_uid": 0}
+    if meta.calibrations:
+        run["calibrations"] = [asdict(each) for each in meta.calibrations]
+    return [run]
 
 
 def _niches(paths: list[Path], metas: list[read.Meta]) -> Niches:

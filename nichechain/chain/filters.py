@@ -54,13 +54,7 @@ def counts_of(
     if run is not None:
         births = births.filter(pc.equal(births["run"], _run(births, run)))
     if steps is not None:
-        if len(steps) != 2 or not all(isinstance(step, (int, np.integer)) for step in steps):
-            raise NichechainError(f"steps are {steps!r}, but must be a window such as (0, 100)")
-        first, end = steps
-        if not 0 <= first < end:
-            raise NichechainError(f"steps are {first} to {end}, but must be a window such as (0, 100)")
-        step = _said(births, "step", "their step")
-        births = births.filter(pc.and_(pc.greater_equal(step, first), pc.less(step, end)))
+        births = within_steps(births, steps)
     if accepted:
         births = births.filter(_said(births, "accepted", "whether they were accepted"))
     if lineages is not None:
@@ -69,6 +63,23 @@ def counts_of(
         # What is asked for by name is counted like any other births.
         births = births.filter(flag if lineages else pc.invert(flag)).drop_columns([LINEAGE])
     return TransitionCounts.from_births(births, niches)
+
+
+def within_steps(births: pa.Table, steps: tuple[int, int]) -> pa.Table:
+    """Births from the first of these steps up to, and without, the second.
+
+    Raises
+    ------
+    NichechainError
+        If the window is empty, or births do not say their step.
+    """
+    if len(steps) != 2 or not all(isinstance(step, (int, np.integer)) for step in steps):
+        raise NichechainError(f"steps are {steps!r}, but must be a window such as (0, 100)")
+    first, end = steps
+    if not 0 <= first < end:
+        raise NichechainError(f"steps are {first} to {end}, but must be a window such as (0, 100)")
+    step = _said(births, "step", "their step")
+    return births.filter(pc.and_(pc.greater_equal(step, first), pc.less(step, end)))
 
 
 def _run(births: pa.Table, run: int) -> int:

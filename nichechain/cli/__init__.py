@@ -25,7 +25,7 @@ COMMANDS = {
     "walks": "walks under pressure and with other metrics, tested and reported",
     "study": "searches by several selections of parents, compared and reported",
     "estimate": "the estimate of T, how well it foretells births, and whether they are enough",
-    "compare": "l-evolvability, reach and coverage of one archive against another",
+    "compare": "l-evolvability, reach and coverage of archives against others",
     "verify": "whether an archive is what its configuration leads to, to the last bit",
     "merge": "archives of one domain, niches and mutation as one",
     "import": "births of another program's search, from CSV or Parquet",

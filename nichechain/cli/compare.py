@@ -1,7 +1,8 @@
-"""``nichechain compare``: one archive against another."""
+"""``nichechain compare``: archives against others."""
 
 from __future__ import annotations
 
+import itertools
 import json
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
@@ -25,22 +26,28 @@ _NAMES = {
 
 @dataclass(frozen=True)
 class CompareCommand:
-    """l-evolvability, reach and coverage of one archive against another of the same niches."""
+    """l-evolvability, reach and coverage of archives against others of the same niches.
+
+    Several runs of a search on a side are pooled, and the interval tells how runs differ:
+    nichechain compare 'archives/uniform-*' 'archives/reach-*'
+    """
 
     first: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="A")]
-    """Archive folder, or the name of an archive that ships with nichechain."""
+    """Archive folder, or the name of an archive that ships with nichechain; for several runs a pattern in
+    quotes, such as 'archives/a-*', or names with commas between them."""
     second: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="B")]
-    """Another: operators, seeds, searches or domains may differ, niches not."""
+    """Others: operators, seeds, searches or domains may differ, niches not."""
     all_births: bool = False
     """All births of all runs, not only as many of each as the shortest has."""
+    steps: parsing.Steps = None
     l: int = 5
     """Generations to look ahead."""
     lineages: int = 100
     """Independent lineages U: l times U descendants."""
     min_births: int = 20
-    """Niches with fewer births behind their row of T, in either archive, are left out."""
+    """Niches with fewer births behind their row of T, on either side, are left out."""
     resamples: int = 100
-    """Resamples of runs, or of elites where an archive has one run, for the interval."""
+    """Resamples of runs, or of elites where a side has one run, for the interval."""
     draws: int = 4
     """Posterior draws of T for each resample."""
     seed: int = 0
@@ -51,26 +58,28 @@ class CompareCommand:
 
 def run(arguments: Sequence[str]) -> int:
     """Compare."""
+    _check_sides(arguments)
     command = parsing.parse(CompareCommand, arguments)
-    from nichechain.archive import read
-    from nichechain.archive.archive import load
+    from nichechain.cli import groups
     from nichechain.evolvability.question import Question
     from nichechain.validation.contrast import contrast
 
     Question(command.l, command.lineages)
     check_at_least(0, **{"--seed": command.seed})
-    archives = load(command.first), load(command.second)
-    if archives[0].niches != archives[1].niches:
-        raise NichechainError(
-            f"{command.first} and {command.second} have different niches: compare archives of the same grid, "
-            "bounds and outside"
-        )
-    births = [read.read_births(archive.folder, archive.meta) for archive in archives]
+    sides = [groups.archives_of(text) for text in (command.first, command.second)]
+    first, *others = (archive for side in sides for archive in side)
+    for other in others:
+        if other.niches != first.niches:
+            raise NichechainError(
+                f"{first.folder} and {other.folder} have different niches: "
+                "compare archives of the same grid, bounds and outside"
+            )
+    births = [[parsing.seen(archive, command.steps).table() for archive in side] for side in sides]
     with progress.adding(2 * command.resamples, "resamples") as tell:
         found = contrast(
             births[0],
             births[1],
-            archives[0].niches,
+            first.niches,
             align=not command.all_births,
             l=command.l,
             lineages=command.lineages,
@@ -83,10 +92,27 @@ def run(arguments: Sequence[str]) -> int:
     if command.format == "csv":
         print(found.to_frame().to_csv(index=False), end="")
     elif command.format == "json":
-        print(json.dumps(asdict(found), indent=2))
+        named = [[str(archive.folder) for archive in side] for side in sides]
+        print(json.dumps({"archives": named, **asdict(found)}, indent=2))
     else:
         _show(found)
+        for name, side in zip("AB", sides, strict=True):
+            if odd := groups.differences(side):
+                output.console().print(
+                    f"The {len(side)} archives of {name} differ in {', '.join(odd)}: "
+                    "pooled, they are no runs of one search."
+                )
     return 0
+
+
+def _check_sides(arguments: Sequence[str]) -> None:
+    """Say what to do where a shell has spelled out a pattern."""
+    names = list(itertools.takewhile(lambda word: not word.startswith("-"), arguments))
+    if len(names) > 2:
+        raise NichechainError(
+            f"there are {len(names)} archives, but must be two sides: put a pattern in quotes, such as "
+            "'archives/a-*', or commas between the archives of a side"
+        )
 
 
 def _show(found: Contrast) -> None:
@@ -107,7 +133,7 @@ def _show(found: Contrast) -> None:
     if any(kind == "elites" for kind, _ in found.clusters):
         shown.print(
             "One run says nothing of how runs differ: the interval is that of other elites within it. "
-            "Merge several runs to have it over runs."
+            "Several runs on each side, such as 'archives/a-*', have it over runs."
         )
 
 

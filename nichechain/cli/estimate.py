@@ -221,13 +221,12 @@ def _stability(command: EstimateCommand, archive: Archive) -> None:
 
 def _course(command: EstimateCommand, archive: Archive) -> LevelCourse | None:
     """Level against steps and births; None where births say no step or are too few, or niches too many."""
-    from nichechain.archive.read import read_births
     from nichechain.evolvability.question import MOST_EXACT
     from nichechain.validation.drift import level_course
 
     if command.steps is not None or archive.niches.states > MOST_EXACT:
         return None
-    births = read_births(archive.folder, archive.meta)
+    births = archive.table()
     posterior = archive.chain().posterior
     law = None if posterior is None else posterior.law
     try:

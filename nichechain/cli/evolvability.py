@@ -227,14 +227,13 @@ def _best(command: EvolvabilityCommand, chain: NicheChain) -> pd.DataFrame:
 
 def _drift(command: EvolvabilityCommand, archive: Archive, chain: NicheChain) -> str:
     """What to say where early and late births disagree on the level, else nothing."""
-    from nichechain.archive.read import read_births
     from nichechain.evolvability.question import MOST_EXACT
     from nichechain.validation.drift import level_drift
 
     # Beyond, a level in closed form would take longer than what was asked for.
     if command.steps is not None or command.format != "table" or archive.niches.states > MOST_EXACT:
         return ""
-    births = read_births(archive.folder, archive.meta)
+    births = archive.table()
     law = None if chain.posterior is None else chain.posterior.law
     asked = {"l": command.l, "lineages": command.lineages, "seed": command.seed}
     try:

@@ -34,6 +34,7 @@ class ExploreCommand:
     """Folder of what `nichechain watch` made, shown with the elites: 14,14.gif and so on."""
     beside: parsing.ArchivePath | None = None
     """A second archive to show beside the first."""
+    steps: parsing.Steps = None
 
 
 def run(arguments: Sequence[str]) -> int:
@@ -44,8 +45,8 @@ def run(arguments: Sequence[str]) -> int:
     from nichechain.archive.archive import load
     from nichechain.plots.explorer import write_explorer
 
-    archive = load(command.path)
-    other = None if command.beside is None else load(command.beside)
+    archive = parsing.seen(load(command.path), command.steps)
+    other = None if command.beside is None else parsing.seen(load(command.beside), command.steps)
     with progress.spinner("computing intervals over posterior draws"):
         write_explorer(
             archive,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields
@@ -86,7 +87,8 @@ def parse(
         arguments = [*arguments[:place], "--format", "json", *arguments[place + 1 :]]
     given = {} if default is None else {"default": default}
     try:
-        with refusals.in_one_sentence(f"nichechain {name}"):
+        asked = {"-h", "--help"}.intersection(arguments)
+        with contextlib.nullcontext() if asked else refusals.in_one_sentence(f"nichechain {name}"):
             read: Command = tyro.cli(  # type: ignore[call-overload]
                 command,
                 prog=f"nichechain {name}",

@@ -33,6 +33,7 @@ class SweepCommand:
     """Births behind a row of T that is known."""
     draws: int = 10
     """Posterior draws of T behind the score."""
+    steps: parsing.Steps = None
     seed: int = 0
     """Of draws, and of the elites that are held out."""
     out: Annotated[Path | None, parsing.option("FILE", "none")] = None
@@ -48,7 +49,7 @@ def run(arguments: Sequence[str]) -> int:
     from nichechain.archive.archive import load
     from nichechain.validation.grid_size import default_sizes, sweep
 
-    archive = load(command.path)
+    archive = parsing.seen(load(command.path), command.steps)
     sizes = None if command.sizes is None else parse_sizes(command.sizes)
     tried = len(default_sizes(len(archive.niches.bounds)) if sizes is None else sizes)
     behavior = None if command.behavior is None else _numbers(command.behavior)

@@ -31,9 +31,7 @@ def recorded_children(archive: Archive, uids: Ints) -> sparse.csr_array:
     -----
     Accepted or not, every child counts that did not fail.
     """
-    from nichechain.archive.read import read_births
-
-    births = read_births(archive.folder, archive.meta, ["parent_uid", "child_niche"])
+    births = archive.table(["parent_uid", "child_niche"])
     parent, child = (births[name].fill_null(NONE).to_numpy().astype(np.int64) for name in births.column_names)
     order = np.argsort(uids)
     place = np.minimum(np.searchsorted(uids, parent, sorter=order), max(0, uids.size - 1))

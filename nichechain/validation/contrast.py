@@ -1,8 +1,8 @@
-"""Whether one archive's niches are more evolvable than another's, with runs or elites as the sample."""
+"""Whether niches of one search are more evolvable than another's, with runs or elites as the sample."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 
 import numpy as np
@@ -12,9 +12,11 @@ from numpy.typing import NDArray
 from scipy.special import stdtrit
 
 from nichechain.births.joins import across_runs
-from nichechain.births.table import NONE, check_columns
+from nichechain.births.lineages import no_lineages
+from nichechain.births.table import LINEAGE, NONE, check_columns
 from nichechain.chain.counts import TransitionCounts
 from nichechain.chain.estimators import estimate, refitted
+from nichechain.chain.lineages import fitted_law
 from nichechain.core.checks import check_at_least
 from nichechain.core.errors import NichechainError
 from nichechain.core.randomness import Purpose, keyed
@@ -35,7 +37,7 @@ _VALUE_DRAWS = 50
 
 @dataclass(frozen=True)
 class ContrastRow:
-    """One figure of two archives.
+    """One figure of two groups of archives.
 
     Parameters
     ----------
@@ -61,26 +63,26 @@ class ContrastRow:
 
 @dataclass(frozen=True)
 class Contrast:
-    """Two archives of equal niches, figure by figure.
+    """Two groups of archives of equal niches, figure by figure.
 
     Parameters
     ----------
     rows : tuple of ContrastRow
         ``evolvability``: niches that U lineages reach, ``reach``: niches that one lineage does,
         both as means over the niches compared; ``coverage``: niches filled by as many births as
-        the smaller archive has.
+        the smaller group has.
     niches : int
-        Niches compared: those with ``min_births`` births behind their row in both archives.
+        Niches compared: those with ``min_births`` births behind their row in both groups.
     clusters : tuple of (str, int)
-        Of each archive what was resampled, ``runs`` or ``elites``, and how many there are.
+        Of each group what was resampled, ``runs`` or ``elites``, and how many there are.
     births : int
         Births at which coverage is compared.
     used, recorded : (int, int)
-        Births of each archive that were compared, and those that it has.
+        Births of each group that were compared, and those that it has.
     aligned : int, optional
         Births of each run that were compared; None where all were.
     shared : int
-        Births that both archives begin with: one search, where they are many.
+        Births that both groups begin with: one search, where they are many.
     l, lineages, min_births, resamples : int
     """
 
@@ -103,8 +105,8 @@ class Contrast:
 
 
 def contrast(
-    first: pa.Table,
-    second: pa.Table,
+    first: pa.Table | Sequence[pa.Table],
+    second: pa.Table | Sequence[pa.Table],
     niches: Niches,
     *,
     align: bool = True,
@@ -116,30 +118,30 @@ def contrast(
     seed: int = 0,
     on_done: Callable[[int], None] | None = None,
 ) -> Contrast:
-    """Compare the births of two archives.
+    """Compare the births of two archives, or of two groups of archives.
 
     Parameters
     ----------
-    first, second : pyarrow.Table
-        Columns of :mod:`nichechain.births.table`.
+    first, second : pyarrow.Table, or sequence of them
+        Columns of :mod:`nichechain.births.table`. Runs of different tables are different runs.
     niches : Niches
-        The niches of both.
+        The niches of all.
     align : bool
         Whether only the first births of each run count, in the order of steps, as many as the shortest
-        run of both archives has: the level of l-evolvability may drift while a search goes on.
+        of all runs has: the level of l-evolvability may drift while a search goes on.
     l, lineages : int
         Generations and number U of lineages.
     min_births : int
-        Niches with fewer births behind their row, in either archive, are left out of evolvability
+        Niches with fewer births behind their row, in either group, are left out of evolvability
         and reach.
     resamples : int
-        Resamples of the births of either archive, at least 2.
+        Resamples of the births of either group, at least 2.
     draws : int
         Posterior draws of T for each resample.
     seed : int
         Of resamples and draws.
     on_done : callable, optional
-        Told how many more resamples are done, of both archives together.
+        Told how many more resamples are done, of both groups together.
 
     Returns
     -------
@@ -152,16 +154,18 @@ def contrast(
 
     Notes
     -----
-    Where an archive has several runs, whole runs are drawn with replacement; where it has one,
-    its elites are, with all their children: then the interval tells what other elites of this
-    run would have changed, not what another run would. The prior keeps the strength that
-    all births gave. Resamples hold fewer different births than a real sample, which lowers
+    The births of a group are pooled. Where it has several runs, whole runs are drawn with replacement;
+    where it has one, its elites are, with all their children: then the interval tells what other elites of
+    this run would have changed, not what another run would. The prior keeps the strength that all births
+    gave. How lineages differ from children of elites is fitted again, to the lineages of the runs that were
+    drawn, or to broods drawn likewise. Resamples hold fewer different births than a real sample, which lowers
     every figure, so only their spread is used: the interval is the difference ± its standard error
     times Student's quantile, and for few runs r the spread is corrected by √(r/(r − 1)).
     """
     question = Question(l, lineages, draws=draws, seed=seed)
     check_at_least(2, resamples=resamples)
     check_at_least(0, min_births=min_births)
+    first, second = _pooled("first", first), _pooled("second", second)
     recorded = len(first), len(second)
     first, second = _in_order(first), _in_order(second)
     shared = _shared(first, second)
@@ -177,7 +181,7 @@ def contrast(
     compared = np.flatnonzero(enough[0] & enough[1])
     if not compared.size:
         raise NichechainError(
-            f"no niche has {min_births} births behind its row of T in both archives: lower min_births"
+            f"no niche has {min_births} births behind its row of T in both groups: lower min_births"
         )
     size = min(int(counts.visits.sum()) for counts in whole)
     values, spreads, freedom = [], [], []
@@ -187,6 +191,8 @@ def contrast(
 
         def figures(counts: TransitionCounts, draws: int, rng: np.random.Generator) -> Floats:
             posterior = refitted(fitted, counts)  # noqa: B023  # called in this round only
+            if counts is not whole[number]:  # noqa: B023
+                posterior = replace(posterior, law=fitted_law(posterior))
             found = np.zeros(2)
             for _ in range(draws):
                 one = replace(question, seed=int(rng.integers(2**31)))
@@ -196,13 +202,12 @@ def contrast(
                 found, rarefied_coverage(visits, min(size, int(visits.sum())), counted=len(niches))
             )
 
-        # Both are drawn alike, so that archives of the same births do not differ.
+        # Both are drawn alike, so that groups of the same births do not differ.
         values.append(figures(counts, _VALUE_DRAWS, keyed(seed, Purpose.POSTERIOR)))
 
         def figures_again(resample: int) -> Floats:
             rng = keyed(seed, Purpose.RESAMPLING, resample)
-            again = side.counts(side.resampled(rng))  # noqa: B023
-            return figures(again, draws, rng)
+            return figures(side.resampled(rng), draws, rng)  # noqa: B023
 
         again = side_by_side(figures_again, range(number, 2 * resamples, 2), on_done)
         correction = side.clusters / max(1, side.clusters - 1)
@@ -237,9 +242,23 @@ def contrast(
     )
 
 
+def _pooled(name: str, births: pa.Table | Sequence[pa.Table]) -> pa.Table:
+    """The tables one after the other, their runs numbered on."""
+    tables = [births] if isinstance(births, pa.Table) else list(births)
+    if not tables or not all(isinstance(table, pa.Table) for table in tables):
+        raise NichechainError(f"{name} is {births!r:.60}, but must be a table of births or several")
+    taken, numbered = 0, []
+    for table in tables:
+        check_columns(table, *_COLUMNS)
+        _, run = np.unique(table["run"].to_numpy(), return_inverse=True)
+        place = table.schema.get_field_index("run")
+        numbered.append(table.set_column(place, "run", pa.array(run.ravel().astype(np.int32) + taken)))
+        taken += int(run.max(initial=-1)) + 1
+    return pa.concat_tables(numbered)
+
+
 def _in_order(births: pa.Table) -> pa.Table:
     """Births run by run, in the order of their steps, or as they come where they do not say them."""
-    check_columns(births, *_COLUMNS)
     run = births["run"].to_numpy()
     known = "step" in births.column_names and not births["step"].null_count
     step = births["step"].to_numpy() if known else np.zeros(run.size)
@@ -271,14 +290,17 @@ def _shared(first: pa.Table, second: pa.Table) -> int:
 
 @dataclass(frozen=True)
 class _Side:
-    """Births of one archive, in clusters that are drawn together.
+    """Births of one group, in clusters that are drawn together.
 
     Parameters
     ----------
     niches : Niches
     parent, child, elite, cluster : (N,) int64 arrays
-        Births that did not fail; ``NONE`` for a null parent, and for the cluster of a birth that
-        is in every resample.
+        Births that did not fail; ``NONE`` for a parent that is null or no elite, and for the cluster of a
+        birth that is in every resample.
+    lineages : tuple of (L, 6) int64 arrays
+        Births of unselected lineages, see :mod:`nichechain.births.lineages`, in parts that are drawn
+        together: those of a run, or a brood.
     kind : {"runs", "elites"}
     clusters : int
     """
@@ -288,6 +310,7 @@ class _Side:
     child: Ints
     elite: Ints
     cluster: Ints
+    lineages: tuple[Ints, ...]
     kind: str
     clusters: int
 
@@ -297,35 +320,57 @@ class _Side:
             births[name].fill_null(NONE).to_numpy().astype(np.int64)
             for name in ("parent_niche", "child_niche", "parent_uid", "run")
         )
+        if LINEAGE in births.column_names:
+            # What lineages do is a law of its own, and no row of T.
+            parent = np.where(births[LINEAGE].fill_null(False).to_numpy(), NONE, parent)
+        every_run = run
         parent, child, uid, run = (column[child != NONE] for column in (parent, child, uid, run))
         (elite,) = across_runs(run, uid)
         # A birth of a parent that is not known is a cluster, and an elite, of its own.
         elite = np.where(elite == NONE, elite.max(initial=NONE) + 1 + np.arange(elite.size), elite)
         names, by_run = np.unique(run, return_inverse=True)
         if names.size > 1:
-            return cls(niches, parent, child, elite, by_run.ravel().astype(np.int64), "runs", names.size)
+            by_run = by_run.ravel().astype(np.int64)
+            lineages = tuple(
+                TransitionCounts.from_births(births.filter(pa.array(every_run == name)), niches).lineages
+                for name in names
+            )
+            return cls(niches, parent, child, elite, by_run, lineages, "runs", names.size)
         cluster = np.full(parent.size, NONE, np.int64)
         moved = parent != NONE
+        table = TransitionCounts.from_births(births, niches).lineages
+        lineages = tuple(table[table[:, 0] == brood] for brood in np.unique(table[:, 0]))
         owners, number = np.unique(elite[moved], return_inverse=True)
         cluster[moved] = number.ravel()
-        return cls(niches, parent, child, elite, cluster, "elites", owners.size)
+        return cls(niches, parent, child, elite, cluster, lineages, "elites", owners.size)
 
-    def counts(self, multiplicity: Ints | None = None) -> TransitionCounts:
-        """Counts of all births, or of each cluster so many times (clusters,)."""
-        n = np.ones(self.parent.size, np.int64)
-        if multiplicity is not None:
-            # Initial births of a single run are nobody's children, and stay.
-            n = np.where(self.cluster == NONE, 1, multiplicity[self.cluster])
+    def counts(self) -> TransitionCounts:
+        """Counts of all births."""
+        counts = TransitionCounts.from_births(self.parent, self.child, self.niches, elite=self.elite)
+        return replace(counts, lineages=_together(self.lineages))
+
+    def resampled(self, rng: np.random.Generator) -> TransitionCounts:
+        """Counts of as many clusters, drawn with replacement."""
+        drawn = np.bincount(rng.integers(self.clusters, size=self.clusters), minlength=self.clusters)
+        # Births of a single run that are no elite's children stay.
+        n = np.where(self.cluster == NONE, 1, drawn[self.cluster])
         moved = self.parent != NONE
-        if multiplicity is None:
-            counts = TransitionCounts.from_births(self.parent, self.child, self.niches, elite=self.elite)
-        else:
-            counts = TransitionCounts.from_pairs(self.parent[moved], self.child[moved], self.niches, n[moved])
+        counts = TransitionCounts.from_pairs(self.parent[moved], self.child[moved], self.niches, n[moved])
         # The counts have been made, so every child's state is one of these niches.
         visits = np.zeros(self.niches.states, np.int64)
         np.add.at(visits, self.child, n)
-        return replace(counts, visits=visits)
+        parts = len(self.lineages)
+        again = drawn if self.kind == "runs" else np.bincount(rng.choice(parts, size=parts), minlength=parts)
+        lineages = [part for part, times in zip(self.lineages, again, strict=True) for _ in range(times)]
+        return replace(counts, visits=visits, lineages=_together(lineages))
 
-    def resampled(self, rng: np.random.Generator) -> Ints:
-        """How often each cluster was drawn, (clusters,)."""
-        return np.bincount(rng.integers(self.clusters, size=self.clusters), minlength=self.clusters)
+
+def _together(lineages: Sequence[Ints]) -> Ints:
+    """Tables of lineages as one, their broods and lineages numbered on."""
+    taken, numbered = np.zeros(2, np.int64), [no_lineages()]
+    for table in lineages:
+        moved = table.copy()
+        moved[:, :2] += taken
+        taken = np.maximum(taken, moved[:, :2].max(axis=0, initial=-1) + 1)
+        numbered.append(moved)
+    return np.concatenate(numbered)

@@ -191,7 +191,8 @@ def sweep(
     Parameters
     ----------
     archive : Archive
-        Whose births have behaviors and known parents.
+        Whose births have behaviors and known parents. Of an archive during some steps, births of other
+        steps are only parents.
     sizes : sequence of int or tuple of int, optional
         Cells along every axis, or along each one; by default ten sizes, from 4 to 3,200 niches in
         all. Ten thousand niches take minutes.
@@ -279,9 +280,9 @@ def _pairs(archive: Archive) -> tuple[Floats, Floats, Ints]:
 
     Initial births, which nobody bore, have NaN for a parent and ``NONE`` for its number.
     """
-    births = archive.births()
-    names = [f"behavior_{name}" for name in archive.meta.facts.behavior_names]
-    behavior = births[names].to_numpy(np.float64)
+    # Parents may be older than the steps that are asked about.
+    births = archive.table(whole=True).to_pandas(use_threads=False)
+    behavior = births.filter(like="behavior_").to_numpy(np.float64)
     if not np.isfinite(behavior).any():
         raise NichechainError(f"{archive.folder} has births without behavior, which cannot be binned again")
     if births["parent_uid"].isna().all():
@@ -291,6 +292,9 @@ def _pairs(archive: Archive) -> tuple[Floats, Floats, Ints]:
     )
     parents = np.where(elite[:, None] == NONE, np.nan, behavior[elite])
     fine = np.isfinite(behavior).all(axis=1)
+    if archive.steps is not None:
+        first, end = archive.steps
+        fine &= ((births["step"] >= first) & (births["step"] < end)).to_numpy(bool)
     return parents[fine], behavior[fine], elite[fine]
 
 

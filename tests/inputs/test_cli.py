@@ -119,8 +119,9 @@ TABLE: tuple[tuple[str, str, tuple[str, ...], Bad], ...] = (
         "CompareCommand",
         ("{archive}", "{archive}", "--resamples", "2"),
         {
-            "first": _PATH,
-            "second": (*_PATH, "{other}"),
+            "first": (*_PATH, "no-such-*", ""),
+            "second": (*_PATH, "{other}", "no-such-*", "{archive},{spare}"),
+            "steps": _STEPS,
             "min_births": (*_NATURAL, "10000"),
             "resamples": ("1", *_COUNT),
             "draws": _COUNT,
@@ -203,6 +204,7 @@ TABLE: tuple[tuple[str, str, tuple[str, ...], Bad], ...] = (
         ("{archive}", "--out", "{fresh}"),
         {
             "path": _PATH,
+            "steps": _STEPS,
             "out": ("/no/such/folder/page.html", "{archive}"),
             "draws": _COUNT,
             "films": ("/no/such/folder", "{archive}/meta.json"),
@@ -354,6 +356,7 @@ TABLE: tuple[tuple[str, str, tuple[str, ...], Bad], ...] = (
         ("{archive}", "--sizes", "2", "--draws", "2"),
         {
             "path": _PATH,
+            "steps": _STEPS,
             "sizes": ("0", "a", "2,-1", "2.5", "1000000", ""),
             "behavior": ("0", "9,9", "a,b", "nan,0", "0,0,0"),
             "min_births": _NATURAL,

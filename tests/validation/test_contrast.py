@@ -115,6 +115,53 @@ def test_intervals_hold_the_truth_about_as_often_as_they_say():
     assert sum(inside) >= 15
 
 
+def test_tables_of_a_group_are_runs_of_it():
+    tables = [births(3, seed, per_run=400) for seed in (10, 11, 12)]
+    together = pa.concat_tables(
+        [
+            table.set_column(0, "run", pa.array(np.full(len(table), run, np.int32)))
+            for run, table in enumerate(tables)
+        ]
+    )
+    other = births(5, 13, per_run=400)
+    options = {"resamples": 4, "l": 2, "lineages": 5}
+    found = contrast(tables, [other], GRID, **options)
+    assert found == contrast(together, other, GRID, **options)
+    assert found.clusters[0] == ("runs", 3)
+    assert found.used == (1200, 400)
+
+
+def with_lineages(width, seed, broods=6, stay=0.0):
+    """The same births, and broods of three lineages of five generations, which stay where they are."""
+    rows = births(width, seed, per_run=900).to_pylist()
+    rng = np.random.default_rng(seed)
+    for brood in range(broods):
+        for _ in range(3):
+            parent, niche = rows[brood]["uid"], rows[brood]["child_niche"]
+            for generation in range(5):
+                child = niche if rng.random() < stay else (niche + 1 + int(rng.integers(width))) % 16
+                row = dict.fromkeys(rows[0]) | {"run": 0, "uid": len(rows), "parent_uid": parent}
+                rows.append(row | {"parent_niche": niche, "child_niche": child, "lineage": generation > 0})
+                parent, niche = row["uid"], child
+    return pa.Table.from_pylist(rows, schema=schema(2))
+
+
+def test_births_of_lineages_are_no_rows_of_t():
+    lively, lazy = with_lineages(4, 14), with_lineages(4, 14, stay=1.0)
+    options = {"resamples": 4, "l": 3, "lineages": 5, "min_births": 1, "align": False}
+    found = contrast(lively, lazy, GRID, **options)
+    # T is the same; that lineages stay is seen in what they reach.
+    assert found.rows[1].difference < -0.3
+    # Ten elites in each of 16 niches have children; who goes on with a lineage is none.
+    assert found.clusters == (("elites", 160), ("elites", 160))
+
+
+@pytest.mark.parametrize("group", [[], [3], "births"])
+def test_what_is_no_group(group):
+    with pytest.raises(NichechainError, match="must be a table of births or several"):
+        contrast(group, births(3, 9, per_run=50), GRID)
+
+
 @pytest.mark.parametrize(
     ("options", "said"),
     [

@@ -248,10 +248,18 @@ function liveliest() {
   return known.reduce((best, j) => (worth(j) > worth(best) ? j : best), known[0] || 0);
 }
 
+/** Steps of the births that are shown, the last of which is not among them. */
+function windowText() {
+  const [first, end] = data.steps;
+  return end < 2 ** 31 - 1 ? `${first} to ${end - 1}` : `${first} on`;
+}
+
 document.title = `${data.name}: nichechain explore`;
 get("title").textContent = data.name;
+const shareOutside = `${((100 * data.birthsOutside) / Math.max(1, data.birthsSeen)).toFixed(1)} % of them outside`;
 get("summary").textContent = `${data.domain}: ${data.filled} of ${n} niches filled by ${data.births} births, ` +
-  `${((100 * data.birthsOutside) / Math.max(1, data.births)).toFixed(1)} % of them outside; T: ${data.estimator}`;
+  (data.steps ? `seen through ${data.birthsSeen} births of steps ${windowText()}, ` : "") +
+  `${shareOutside}; T: ${data.estimator}`;
 get("method").textContent = "Convention: definition, the root's own niche counts only if a descendant returns to it. " +
   "A lineage has l generations; U lineages have l·U descendants. Arrows, and where lineages go, are by the mean of T" +
   (data.strongest ? `, of which the ${data.strongest} strongest transitions of every niche are kept. ` : ". ") +

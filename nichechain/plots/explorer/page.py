@@ -159,6 +159,8 @@ def _facts(archive: Archive, chain: NicheChain) -> dict[str, Any]:
         "name": archive.folder.resolve().name,
         "domain": archive.config.domain,
         "births": archive.meta.births,
+        "birthsSeen": archive.meta.births if archive.steps is None else len(archive.table(["step"])),
+        "steps": None if archive.steps is None else list(archive.steps),
         "birthsOutside": counts.births_outside,
         "filled": archive.filled,
         "bounds": [list(pair) for pair in niches.bounds],

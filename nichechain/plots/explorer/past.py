@@ -25,8 +25,9 @@ _NOWHERE = 65_535
 
 def past(archive: Archive) -> dict[str, Any]:
     """Births in and out of every niche at some stages, and ancestors of the elites."""
-    births = archive.births()
-    return {**_stages(archive, births), **_ancestors(archive, births)}
+    seen, whole = (archive.table(whole=whole).to_pandas(use_threads=False) for whole in (False, True))
+    # Of a window of steps only its births are counted, but elites may be older, and their ancestors are.
+    return {**_stages(archive, seen), **_ancestors(archive, whole)}
 
 
 def _stages(archive: Archive, births: pd.DataFrame) -> dict[str, Any]:

@@ -9,7 +9,6 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from nichechain.archive.archive import Archive
-from nichechain.archive.read import read_births
 from nichechain.births.table import NONE
 from nichechain.core.randomness import Purpose, keyed
 from nichechain.core.ranks import rank_correlation
@@ -63,7 +62,7 @@ def measure(
         children; at the last step ``offspring_niches``, the mean number of niches that the offspring of an
         elite land in.
     """
-    births = read_births(archive.folder, archive.meta)
+    births = archive.table()
     told = Told.of(births)
     objective = births["objective"].fill_null(np.nan).to_numpy()
     ends = np.append(np.flatnonzero(np.diff(told.step)), len(told) - 1)
