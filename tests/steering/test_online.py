@@ -49,17 +49,17 @@ def test_it_is_the_chain_of_the_same_births(outside):
     np.testing.assert_allclose(online.staying()[never], np.diag(exact.T)[never], rtol=1e-9)
 
 
-def test_births_are_added_and_the_prior_is_fitted_when_they_have_doubled():
+def test_births_are_added_and_the_prior_is_fitted_when_there_are_four_times_as_many():
     niches = GridNiches((5, 6), ((0.0, 1.0), (0.0, 1.0)))
     births = drifting(800, niches.states, 2)
     online = OnlineChain(niches)
     fitted = [0]
     for start in range(0, 800, 100):
         online.tell(births[start : start + 100])
-        due = online.births >= 2 * fitted[-1]
+        due = online.births >= 4 * fitted[-1]
         assert online.settle() == due
         fitted += [online.births] if due else []
-    assert online.fits == len(fitted) - 1 == 3
+    assert online.fits == len(fitted) - 1 == 2
     counts = TransitionCounts.from_births(births.parent_niche, births.child_niche, niches)
     assert online.births == counts.births.sum()
     np.testing.assert_allclose(online.total - online.strength, counts.births / online.design_effect)
