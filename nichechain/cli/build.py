@@ -16,7 +16,7 @@ import tyro
 from nichechain.cli import output, parsing, progress
 from nichechain.core.checks import DomainOption, StepBound
 from nichechain.core.errors import ArchiveError, NichechainError
-from nichechain.search.config import MOST_FAILED, BuildConfig, SearchConfig
+from nichechain.search.config import MOST_FAILED, BuildConfig, SearchConfig, parse_selection
 
 if TYPE_CHECKING:
     from nichechain.domains.base import Domain
@@ -267,6 +267,14 @@ def _check_constant(config: BuildConfig, domain: Domain) -> None:
         )
 
 
+def _parents(config: BuildConfig) -> dict[str, str]:
+    """From when on the chain steers, which needs births to learn from."""
+    if {name for name, _ in parse_selection(config.selection)} <= {"uniform", "curiosity"}:
+        return {}
+    first = config.initial + config.batch
+    return {"parents": f"by {config.selection}; uniformly up to birth {first}, with no child to learn from"}
+
+
 def _report(folder: Path, shown: object) -> None:
     """A short account of a finished build, and what to do next."""
     import numpy as np
@@ -300,6 +308,7 @@ def _report(folder: Path, shown: object) -> None:
         "births": f"{births}, {counts.births_outside} of them outside the grid"
         + (f", {failed} failed" if failed else ""),
         "rows of T observed": f"{counts.rows_observed} of {n}",
+        **_parents(archive.meta.config),
         **output.physics(savings.read(folder)),
         "archive": str(folder),
     }

@@ -170,3 +170,11 @@ def test_a_ranking_that_would_take_long_is_left_to_its_command(tmp_path, capsys,
     said = capsys.readouterr().out
     assert "evolvability ranks them" in said
     assert "Top niches" not in said
+
+
+def test_a_steered_build_says_until_when_parents_are_uniform(tmp_path, capsys):
+    assert main(build(tmp_path / "steered", 300, "--selection", "reach", "--batch", "64")) == 0
+    shown = " ".join(capsys.readouterr().out.split())
+    assert "by reach; uniformly up to birth 164, with no child to learn from" in shown
+    assert main(build(tmp_path / "plain", 200)) == 0
+    assert "uniformly" not in capsys.readouterr().out
