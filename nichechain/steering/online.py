@@ -21,8 +21,8 @@ Ints = NDArray[np.int64]
 _GROWTH = 4.0
 """The prior of rows is fitted again whenever there are so many times the births that it was fitted to.
 
-Fits then cost no more in all than four thirds of the last one. Fitting it up to sixteen times as often made no
-difference to what was filled."""
+Fits then cost no more in all than four thirds of the last one. Fitting it up to sixteen times as often made
+no difference to what was filled."""
 _DIGITS = 3
 """Significant digits of the strength: libraries of other machines differ in the last ones of a sum, which the
 search for its best value would magnify."""
