@@ -85,14 +85,7 @@ def build(
         outside = 0
         if read.is_archive(folder):
             meta = read.read_meta(folder)
-            if meta.origin is not None:
-                raise ArchiveError(f"{folder} was {meta.origin['kind']}, so no build can go on with it")
-            if meta.calibrations:
-                raise ArchiveError(
-                    f"{folder} has {meta.births - meta.built} births of a calibration, so no build can go on "
-                    "with it: build as far as you want, then calibrate"
-                )
-            _check_continues(meta.config, config, meta.births, folder)
+            check_resumable(meta, config, folder)
             niches = read.read_niches(folder, meta)
             state = read.read_state(folder, meta)
             selection = make_selection(config, niches)
@@ -134,7 +127,22 @@ def _landed(rows: pa.Table) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     return behavior, rows["child_niche"].fill_null(NONE).to_numpy()
 
 
-def _check_continues(old: BuildConfig, new: BuildConfig, births: int, folder: Path) -> None:
+def check_resumable(meta: read.Meta, new: BuildConfig, folder: Path) -> None:
+    """Refuse to go on with an archive that no build made, or one of another configuration.
+
+    Raises
+    ------
+    ArchiveError
+        If it was merged, imported or calibrated, or was begun with another configuration or has more births.
+    """
+    if meta.origin is not None:
+        raise ArchiveError(f"{folder} was {meta.origin['kind']}, so no build can go on with it")
+    if meta.calibrations:
+        raise ArchiveError(
+            f"{folder} has {meta.births - meta.built} births of a calibration, so no build can go on "
+            "with it: build as far as you want, then calibrate"
+        )
+    old, births = meta.config, meta.births
     if new.evaluations < births:
         raise ArchiveError(f"{folder} has {births} births already, more than the {new.evaluations} asked for")
     if replace(old, evaluations=new.evaluations) != new:

@@ -6,32 +6,22 @@ import re
 import shlex
 import sys
 import warnings
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 import tyro
 
 from nichechain.cli import output, parsing, progress
 from nichechain.core.checks import DomainOption, StepBound
-from nichechain.core.errors import ArchiveError, NichechainError
-from nichechain.search.config import MOST_FAILED, BuildConfig, SearchConfig, parse_selection
+from nichechain.core.errors import NichechainError
+from nichechain.search.config import MOST_FAILED, BuildConfig, SearchConfig
 
 if TYPE_CHECKING:
     from nichechain.domains.base import Domain
 
 _GRID = "20x20"
-# Beyond so many niches, only those of the most births are scored; beyond few, with few draws.
-_MANY_NICHES = 1000
-_SCORED = 200
-_FEW_NICHES, _FEW_DRAWS = 500, 20
-# Where a first look would take about so many seconds, another command is named instead. What a pair of
-# niches takes in the fit of T, and a cubed number of niches in a draw.
-_FIRST_LOOK = 2.0
-_PAIR, _CUBE = 1.2e-5, 2.7e-10
-# Births that a niche must have to be ranked.
-_RANKED = 20
 
 
 def _step_bound(text: str, option: str) -> tuple[StepBound, float]:
@@ -49,6 +39,20 @@ def _layer_scales(text: str, option: str) -> tuple[float, ...]:
 @dataclass(frozen=True)
 class BuildCommand(SearchConfig):
     """Fill an archive: MAP-Elites that records who was born where."""
+
+    GROUPS: ClassVar[Mapping[str, tuple[str, ...]]] = {
+        "niche": ("grid", "niches", "bounds", "outside", "niches_seed"),
+        "mutation": ("mutation", "scale", "df", "step_bound", "layer_scales", "self_adaptive"),
+        "search": ("initial", "batch", "replacement"),
+        "parent": ("selection", "temperature", "selection_l", "selection_lineages"),
+        "lineage": ("lineage_share", "lineage_length", "lineage_brood"),
+        "domain": ("domain_seed", "descriptor", "controller", "steps", "noise", "repeats", "options"),
+        "running": ("workers", "cache_memory", "max_failed"),
+    }
+    EXAMPLES: ClassVar[tuple[str, ...]] = (
+        "nichechain build arm --evaluations 20000 --scale 0.1 --seeds 0..9",
+        "nichechain build gym:Swimmer-v5 --bounds=-2,2,-2,2 --steps 200 --evaluations 2000",
+    )
 
     domain: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="DOMAIN")]
     """What to search: fetch (Fetch Pick and Place), arm (a planar arm, for a quick try), gym:ENV_ID
@@ -108,6 +112,9 @@ class BuildCommand(SearchConfig):
     cache_memory: parsing.CacheMemory = None
     max_failed: float = MOST_FAILED
     """Share of births that may fail, from 0 to 1, before the build is stopped."""
+    seeds: Annotated[str | None, parsing.option("FROM..TO", "one search, of --seed")] = None
+    """Several searches that differ in their seed, one after the other: 0..9, or 0,3,5. Their archives are
+    PATH-seed0 and so on."""
     out: Annotated[Path | None, parsing.option("PATH", "archives/DOMAIN-seedSEED")] = None
     """Archive folder."""
     resume: bool = False
@@ -115,10 +122,12 @@ class BuildCommand(SearchConfig):
     force: bool = False
     """Start over, removing the archive that the folder holds."""
 
-    @property
-    def folder(self) -> Path:
-        """Where the archive goes."""
-        return self.out or Path("archives") / f"{re.sub(r'[:/]', '-', self.domain)}-seed{self.seed}"
+    def folder_of(self, seed: int) -> Path:
+        """Where the archive of the search of this seed goes."""
+        if self.out is not None and self.seeds is None:
+            return self.out
+        begin = self.out or Path("archives") / re.sub(r"[:/]", "-", self.domain)
+        return Path(f"{begin}-seed{seed}")
 
     def domain_options(self) -> dict[str, DomainOption]:
         """What the domain is told."""
@@ -187,7 +196,8 @@ def run(arguments: Sequence[str]) -> int:
     from nichechain import execution
     from nichechain.archive import read, write
     from nichechain.archive.building import build
-    from nichechain.archive.trust import check_trusted
+    from nichechain.cli import built
+    from nichechain.cli.searches import asked_for
     from nichechain.core.files import writing
     from nichechain.search.making import make_domain
 
@@ -195,54 +205,57 @@ def run(arguments: Sequence[str]) -> int:
     if command.domain.startswith("gym:") and here not in sys.path:
         # A descriptor is often a file in the current folder; what is installed comes first.
         sys.path.append(here)
-    if not command.resume:
-        command.config()
-    folder = command.folder
-    if command.resume and command.force:
-        raise NichechainError("--resume and --force exclude each other: go on, or start over")
-    if read.is_archive(folder) and not command.force:
-        stored = read.read_meta(folder)
-        if not command.resume:
-            raise ArchiveError(
-                f"{folder} already holds an archive of {stored.births} births: "
-                "--resume goes on with it, --force starts over"
-            )
-        if command.descriptor is None:
-            check_trusted(stored.config, folder)
-        # What is not said again stays as it was.
-        command = parsing.parse(BuildCommand, arguments, default=BuildCommand.of(stored.config))
-    config = command.config()
+    searches = asked_for(command, arguments)
     shown = output.console()
     with execution.make(command.workers, command.cache_memory) as executor:
-        if command.force and folder.exists():
-            with writing(folder):
-                write.clear(folder)
+        for folder in (search.folder for search in searches if command.force):
+            if folder.exists():
+                with writing(folder):
+                    write.clear(folder)
         with progress.spinner("loading the simulator; its engine is compiled once, in about 20 s"):
             import ribs.archives  # noqa: F401  # takes seconds, which the bar should not count
 
-            domain = make_domain(config)
+            first = searches[0]
+            domain = make_domain(first.config)
             # What goes wrong with it is for the build to say.
             execution.evaluate_rows(domain, domain.sample(1, seed=0))
-            if not read.is_archive(folder):
-                _check_constant(config, domain)
-        try:
-            with progress.build_progress(config.evaluations) as tell:
-                build(
-                    config,
-                    folder,
-                    executor,
-                    domain=domain,
-                    on_progress=tell,
-                    max_failed=command.max_failed,
+            if not read.is_archive(first.folder):
+                _check_constant(first.config, domain)
+        for number, search in enumerate(searches, 1):
+            config, folder = search.config, search.folder
+            name = f"seed {config.seed}, {number} of {len(searches)}" if command.seeds is not None else ""
+            try:
+                with progress.build_progress(config.evaluations, name) as tell:
+                    build(
+                        config,
+                        folder,
+                        executor,
+                        domain=domain,
+                        on_progress=tell,
+                        max_failed=command.max_failed,
+                    )
+            except KeyboardInterrupt:
+                progress.leave_at_next_interrupt()
+                kept = read.read_meta(folder).births if read.is_archive(folder) else 0
+                stopped = f"Stopped at {name}" if name else "Stopped"
+                again = _again(command, folder, arguments if name or not kept else None)
+                shown.print(
+                    f"{stopped}; {kept} of {config.evaluations} births are kept. To go on:\n  {again}"
                 )
-        except KeyboardInterrupt:
-            progress.leave_at_next_interrupt()
-            kept = read.read_meta(folder).births if read.is_archive(folder) else 0
-            again = f"nichechain build {config.domain} --out {shlex.quote(str(folder))} --resume"
-            shown.print(f"Stopped; {kept} of {config.evaluations} births are kept. To go on:\n  {again}")
-            return 130
-    _report(folder, shown)
+                return 130
+    if command.seeds is None:
+        built.report(searches[0].folder, shown)
+    else:
+        built.report_all([search.folder for search in searches], shown)
     return 0
+
+
+def _again(command: BuildCommand, folder: Path, arguments: Sequence[str] | None) -> str:
+    """The command line that goes on; with all that was asked for where the folder does not know it."""
+    if arguments is None:
+        return f"nichechain build {command.domain} --out {shlex.quote(str(folder))} --resume"
+    kept = [word for word in arguments if word not in ("--resume", "--force")]
+    return f"nichechain build {shlex.join(kept)} --resume"
 
 
 def _check_constant(config: BuildConfig, domain: Domain) -> None:
@@ -265,74 +278,3 @@ def _check_constant(config: BuildConfig, domain: Domain) -> None:
             "be replayed or verified; what is random belongs to --noise or --repeats, which average over it",
             stacklevel=2,
         )
-
-
-def _parents(config: BuildConfig) -> dict[str, str]:
-    """From when on the chain steers, which needs births to learn from."""
-    if {name for name, _ in parse_selection(config.selection)} <= {"uniform", "curiosity"}:
-        return {}
-    first = config.initial + config.batch
-    return {"parents": f"by {config.selection}; uniformly up to birth {first}, with no child to learn from"}
-
-
-def _report(folder: Path, shown: object) -> None:
-    """A short account of a finished build, and what to do next."""
-    import numpy as np
-    import pandas as pd
-    from rich.console import Console
-
-    from nichechain.archive.archive import load
-    from nichechain.evolvability.niches import answer_for_niches
-    from nichechain.evolvability.question import DRAWS, Question
-    from nichechain.search import savings
-
-    assert isinstance(shown, Console)
-    archive = load(folder)
-    counts = archive.counts
-    n = len(archive.niches)
-    # A first look, which should keep nobody waiting: only the niches that it may show are scored.
-    births_of = counts.births[:n]
-    most = np.argsort(-births_of, kind="stable")[: _SCORED if n > _MANY_NICHES else n]
-    roots = np.sort(most[births_of[most] >= _RANKED])
-    question = Question(draws=DRAWS if n <= _FEW_NICHES else _FEW_DRAWS)
-    seconds = _PAIR * counts.matrix.nnz + (question.draws * _CUBE * n**3 if n <= _MANY_NICHES else 0.0)
-    ranking = pd.DataFrame()
-    if roots.size and seconds <= _FIRST_LOOK:
-        chain = archive.chain()
-        scores = answer_for_niches(chain, question, roots=roots)
-        ranking = scores.ranking(chain, min_births=_RANKED).dropna().head(5)
-    failed = archive.meta.births - int(counts.visits.sum())
-    births = archive.meta.births
-    rows = {
-        "niches filled": f"{archive.filled} of {n}",
-        "births": f"{births}, {counts.births_outside} of them outside the grid"
-        + (f", {failed} failed" if failed else ""),
-        "rows of T observed": f"{counts.rows_observed} of {n}",
-        **_parents(archive.meta.config),
-        **output.physics(savings.read(folder)),
-        "archive": str(folder),
-    }
-    shown.print()
-    shown.print(output.facts(rows))
-    if len(ranking):
-        top = output.table("niche", "niches reached", "90 % interval", "births behind its row")
-        for row in ranking.itertuples():
-            top.add_row(row.index, f"{row.value:.1f}", f"{row.low:.1f} to {row.high:.1f}", str(row.births))
-        shown.print(
-            f"\n[bold]Top niches by l-evolvability[/]  (l = {scores.l}, {scores.lineages} lineages, "
-            f"{scores.convention}, {scores.estimator})"
-        )
-        shown.print(top)
-    elif roots.size:
-        shown.print(f"\n{roots.size} niches have {_RANKED} births behind their row: evolvability ranks them.")
-    else:
-        shown.print(f"\nNo niche has {_RANKED} births behind its row yet: too few to rank.")
-    shown.print("Next:")
-    best = f" --niche {ranking['index'].iloc[0]}" if len(ranking) else ""
-    path = shlex.quote(str(folder))
-    for line in (
-        f"nichechain evolvability {path}{best}",
-        f"nichechain plot {path} reachability --out reachability.png",
-        f"nichechain info {path}",
-    ):
-        shown.print(f"  {line}")

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias, TypeVar
 
 import tyro
 
-from nichechain.cli import refusals
+from nichechain.cli import described, refusals
 from nichechain.core.errors import NichechainError
 
 if TYPE_CHECKING:
@@ -26,6 +26,7 @@ ArchivePath: TypeAlias = Annotated[
         metavar="PATH", help="Archive folder, or the name of an archive that ships with nichechain."
     ),
 ]
+_MOST_SEEDS = 10_000
 # Such as 1e4 or 2.5e6; two digits of the power are more than any number here needs.
 _POWER = re.compile(r"([+-]?\d+)(?:\.(\d+))?[eE]\+?(\d{1,2})")
 
@@ -59,7 +60,7 @@ CacheMemory: TypeAlias = Annotated[
 
 
 def parse(
-    command: Callable[..., Command],
+    command: type[Command],
     arguments: Sequence[str],
     default: Command | None = None,
     name: str | None = None,
@@ -85,21 +86,25 @@ def parse(
         # The one spelling that every command with a table knows.
         place = list(arguments).index("--json")
         arguments = [*arguments[:place], "--format", "json", *arguments[place + 1 :]]
-    given = {} if default is None else {"default": default}
+    asked = {"-h", "--help"}.intersection(arguments)
+    shown = described.Described(command, default)
     try:
-        asked = {"-h", "--help"}.intersection(arguments)
         with contextlib.nullcontext() if asked else refusals.in_one_sentence(f"nichechain {name}"):
-            read: Command = tyro.cli(  # type: ignore[call-overload]
-                command,
+            read: Any = tyro.cli(
+                shown.type,
                 prog=f"nichechain {name}",
+                description=described.description(command),
                 args=list(arguments),
                 config=(tyro.conf.FlagCreatePairsOff,),
                 registry=_kinds(),
-                **given,
             )
     except _Refused as refused:
         raise refused.error from None
-    return read
+    except SystemExit:
+        if asked and (examples := getattr(command, "EXAMPLES", ())):
+            print("\n".join(["try:", *(f"  {example}" for example in examples)]))
+        raise
+    return shown.command(read)
 
 
 def _kinds() -> tyro.constructors.ConstructorRegistry:
@@ -136,6 +141,28 @@ def whole(text: str) -> int:
     if len(behind) > power:
         raise ValueError(f"invalid literal for int(): {text!r}")
     return int(f"{digits}{behind}{'0' * (power - len(behind))}")
+
+
+def seeds(text: str) -> list[int]:
+    """``"0..3,7"`` as ``[0, 1, 2, 3, 7]``.
+
+    Raises
+    ------
+    NichechainError
+        If the text names no seeds, one twice, or more than 10,000.
+    """
+    found: list[int] = []
+    for part in text.split(","):
+        match = re.fullmatch(r"(\d{1,18})(?:\.\.(\d{1,18}))?", part.strip())
+        if match is None:
+            raise NichechainError(f"--seeds is {text!r}, but must be seeds such as 0..9 or 0,3,5")
+        first, last = int(match[1]), int(match[2] or match[1])
+        if last - first >= _MOST_SEEDS:
+            raise NichechainError(f"--seeds is {text!r}, but must be at most {_MOST_SEEDS} seeds")
+        found += range(first, last + 1)
+    if not found or len(set(found)) < len(found):
+        raise NichechainError(f"--seeds is {text!r}, but must be seeds such as 0..9 or 0,3,5, each once")
+    return found
 
 
 def seen(archive: Archive, steps: str | None) -> Archive:

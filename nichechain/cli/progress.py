@@ -46,8 +46,21 @@ def spinner(text: str) -> Any:
 
 
 @contextmanager
-def build_progress(total: int) -> Iterator[Callable[[BuildProgress], None]]:
-    """A bar of births on standard error; plain lines now and then where that is no terminal."""
+def build_progress(total: int, name: str = "") -> Iterator[Callable[[BuildProgress], None]]:
+    """A bar of births on standard error; plain lines now and then where that is no terminal.
+
+    Parameters
+    ----------
+    total : int
+        Births that there will be.
+    name : str
+        Of which of several builds.
+
+    Yields
+    ------
+    callable
+        Told how far the build is.
+    """
     shown, clock, lines = _console(), _Clock(), _Lines()
     if not shown.is_terminal:
 
@@ -56,15 +69,16 @@ def build_progress(total: int) -> Iterator[Callable[[BuildProgress], None]]:
             if lines.due():
                 left = clock.seconds_left(now.births, total)
                 _say(
-                    f"{now.births} of {total} births, {clock.rate(now.births)}/s, {now.filled} niches "
-                    f"filled, {now.outside} outside, {now.failed} failed, {left:.0f} s left"
+                    f"{name and name + ': '}{now.births} of {total} births, {clock.rate(now.births)}/s, "
+                    f"{now.filled} niches filled, {now.outside} outside, {now.failed} failed, "
+                    f"{left:.0f} s left"
                 )
 
         yield line
         return
     fields = ("{task.fields[rate]}/s", "{task.fields[filled]} niches", "{task.fields[outside]} outside")
-    with _bar(shown, *fields, "{task.fields[failed]}") as bar:
-        task = bar.add_task("", total=total, rate="-", filled=0, outside=0, failed="")
+    with _bar(shown, *fields, "{task.fields[failed]}", named=bool(name)) as bar:
+        task = bar.add_task(name, total=total, rate="-", filled=0, outside=0, failed="")
 
         def tell(now: BuildProgress) -> None:
             clock.begin(now.births)

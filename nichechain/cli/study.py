@@ -56,6 +56,7 @@ class SelectionCommand(BuildCommand):
     selection: tyro.conf.Suppress[str] = "uniform"
     resume: tyro.conf.Suppress[bool] = False
     force: tyro.conf.Suppress[bool] = False
+    seeds: tyro.conf.Suppress[str | None] = None
     max_failed: tyro.conf.Suppress[float] = 0.5
 
     @property

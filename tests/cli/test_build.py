@@ -162,9 +162,9 @@ def test_meta_says_what_made_it(built):
 
 
 def test_a_ranking_that_would_take_long_is_left_to_its_command(tmp_path, capsys, monkeypatch):
-    from nichechain.cli import build
+    from nichechain.cli import built
 
-    monkeypatch.setattr(build, "_FIRST_LOOK", 0.0)
+    monkeypatch.setattr(built, "_FIRST_LOOK", 0.0)
     words = ["build", "arm", "--evaluations", "300", "--grid", "3x3", "--workers", "1"]
     assert main([*words, "--out", str(tmp_path / "a")]) == 0
     said = capsys.readouterr().out

@@ -53,7 +53,7 @@ def test_a_configuration_asks_for_itself(words):
 
 
 def test_the_folder_of_an_environment_is_a_plain_name():
-    assert parse(BuildCommand, ["gym:ALE/Pong-v5", "--seed", "3"]).folder.parts == (
+    assert parse(BuildCommand, ["gym:ALE/Pong-v5"]).folder_of(3).parts == (
         "archives",
         "gym-ALE-Pong-v5-seed3",
     )

@@ -88,6 +88,7 @@ TABLE: tuple[tuple[str, str, tuple[str, ...], Bad], ...] = (
             "replacement": _UNKNOWN,
             "outside": _UNKNOWN,
             "seed": _NATURAL,
+            "seeds": ("3..1", "a", "0..", "1,1", "-1", "1.5", ""),
             "domain_seed": _NATURAL,
             "descriptor": ("final-xy",),
             "controller": ("mlp:4", "lstm"),
@@ -476,6 +477,7 @@ FREE = {
     # Shown and tried where a search is built alone.
     "selection": "a study has several",
     "max_failed": "a study takes the default",
+    "seeds": "a study has runs",
 }
 
 
