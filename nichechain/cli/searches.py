@@ -16,7 +16,7 @@ from nichechain.search.config import BuildConfig
 
 
 @dataclass(frozen=True)
-class Asked:
+class PlannedSearch:
     """A search and where its archive goes.
 
     Parameters
@@ -29,7 +29,7 @@ class Asked:
     folder: Path
 
 
-def asked_for(command: BuildCommand, arguments: Sequence[str]) -> list[Asked]:
+def asked_for(command: BuildCommand, arguments: Sequence[str]) -> list[PlannedSearch]:
     """The searches that a command asks for, in the order of its seeds.
 
     What a command that resumes does not say again stays as it was: in every archive that was begun, and
@@ -67,7 +67,7 @@ def asked_for(command: BuildCommand, arguments: Sequence[str]) -> list[Asked]:
     stored = {seed: read.read_meta(folder) for seed, folder in begun.items()}
     if not begun:
         config = command.config()
-        return [Asked(replace(config, seed=seed), folder) for seed, folder in folders.items()]
+        return [PlannedSearch(replace(config, seed=seed), folder) for seed, folder in folders.items()]
     for seed, meta in stored.items():
         if not command.resume:
             raise ArchiveError(
@@ -86,5 +86,5 @@ def asked_for(command: BuildCommand, arguments: Sequence[str]) -> list[Asked]:
             if again.evaluations == usual.evaluations:
                 own = replace(own, evaluations=stored[seed].config.evaluations)
             check_resumable(stored[seed], own, folder)
-        asked.append(Asked(own, folder))
+        asked.append(PlannedSearch(own, folder))
     return asked
