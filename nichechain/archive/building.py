@@ -27,7 +27,7 @@ from nichechain.search.failures import Failures, check_first_batch
 from nichechain.search.making import make_domain, make_mutation, make_niches
 from nichechain.search.map_elites import MapElites
 from nichechain.search.selection import Told, retrace
-from nichechain.steering import make_selection
+from nichechain.steering import make_contests, make_selection
 
 
 def build(
@@ -88,18 +88,20 @@ def build(
             check_resumable(meta, config, folder)
             niches = read.read_niches(folder, meta)
             state = read.read_state(folder, meta)
-            selection = make_selection(config, niches)
-            told = config.selection != "uniform"
+            selection, contests = make_selection(config, niches), make_contests(config, niches)
+            told = config.selection != "uniform" or contests is not None
             rows = read.read_births(folder, meta, None if told else ["child_niche", "failed"])
             if told:
                 retrace(selection, Told.of(rows))
+            if contests is not None:
+                retrace(contests, Told.of(rows))
             outside = count(rows, len(niches))
             failures.count(rows)
             del rows
         else:
             niches = make_niches(config)
-            selection = make_selection(config, niches)
-        search = MapElites(domain, niches, mutate, config, state, selection)
+            selection, contests = make_selection(config, niches), make_contests(config, niches)
+        search = MapElites(domain, niches, mutate, config, state, selection, contests=contests)
         search.savings = savings.read(folder) if state is not None else search.savings
         writer = write.Writer(folder, config, read.DomainFacts.of(domain), niches=niches)
 

@@ -71,6 +71,10 @@ _LINEAGE_ARRAYS: dict[str, tuple[Any, int]] = {
     "lineage_niche": _INTS,
     "lineage_depth": _INTS,
 }
+# And without a contest that goes on, these.
+_CONTENDER_ARRAYS: dict[str, tuple[Any, int]] = {
+    f"contender_{field.name}": _ARRAYS[field.name] for field in fields(Elites)
+}
 
 
 @dataclass(frozen=True)
@@ -334,19 +338,24 @@ def read_state(folder: Path, meta: Meta) -> SearchState:
     """
     content = _read(folder, meta.elites)
     with _reading(folder / meta.elites["file"]):
-        arrays = untrusted.read_arrays(content, _ARRAYS, _LINEAGE_ARRAYS)
+        arrays = untrusted.read_arrays(content, _ARRAYS, _LINEAGE_ARRAYS, _CONTENDER_ARRAYS)
         elites = Elites(*(arrays[field.name] for field in fields(Elites)))
         arrays.setdefault("pending_lineage", np.zeros(len(arrays["pending_uid"]), bool))
         pending = Offspring(*(arrays[f"pending_{field.name}"] for field in fields(Offspring)))
         lineages = UnderWay.none(elites.genotype.shape[1])
         if "lineage_slot" in arrays:
             lineages = UnderWay(*(arrays[f"lineage_{field.name}"] for field in fields(UnderWay)))
-        _check_state(elites, pending, lineages, meta)
-    return SearchState(elites, pending, meta.births, meta.step, lineages)
+        contenders = Elites.none(elites.genotype.shape[1], elites.behavior.shape[1])
+        if "contender_uid" in arrays:
+            contenders = Elites(*(arrays[f"contender_{field.name}"] for field in fields(Elites)))
+        state = SearchState(elites, pending, meta.births, meta.step, lineages, contenders)
+        _check_state(state, meta)
+    return state
 
 
-def _check_state(elites: Elites, pending: Offspring, lineages: UnderWay, meta: Meta) -> None:
-    for rows in (elites, pending, lineages):
+def _check_state(state: SearchState, meta: Meta) -> None:
+    elites, pending, lineages, contenders = state.elites, state.pending, state.lineages, state.contenders
+    for rows in (elites, pending, lineages, contenders):
         if len({len(column) for column in rows.columns().values()}) != 1:
             raise ValueError("its arrays differ in length")
     if elites.behavior.shape[1] != len(meta.config.bounds):
@@ -355,6 +364,12 @@ def _check_state(elites: Elites, pending: Offspring, lineages: UnderWay, meta: M
         raise ValueError("its genotypes differ in length")
     if len(lineages) and lineages.genotype.shape[1] != elites.genotype.shape[1]:
         raise ValueError("its genotypes differ in length")
+    if contenders.genotype.shape[1] != elites.genotype.shape[1]:
+        raise ValueError("its genotypes differ in length")
+    if contenders.behavior.shape[1] != elites.behavior.shape[1]:
+        raise ValueError("its behaviors differ in their axes")
+    if not np.isin(contenders.niche, elites.niche).all():
+        raise ValueError("its contenders are in niches that nobody holds")
     if (np.diff(lineages.slot, prepend=-1) <= 0).any():
         raise ValueError("its lineages are in no order")
     if (np.diff(elites.niche, prepend=-1) <= 0).any() or (elites.niche > _outside(meta)).any():

@@ -99,7 +99,7 @@ def _longest(values: Any) -> int:
 def read_arrays(
     content: bytes,
     kinds: Mapping[str, tuple[DTypeLike, int]],
-    optional: Mapping[str, tuple[DTypeLike, int]],
+    *optional: Mapping[str, tuple[DTypeLike, int]],
 ) -> dict[str, NDArray[Any]]:
     """Arrays of an ``.npz`` file as ``numpy.savez`` writes it: uncompressed, never pickled.
 
@@ -108,8 +108,8 @@ def read_arrays(
     content : bytes
     kinds : mapping of str to (dtype, int)
         Type and number of dimensions of each array that is wanted.
-    optional : mapping of str to (dtype, int)
-        The same of arrays that are wanted where they are there: all of them, or none is.
+    *optional : mapping of str to (dtype, int)
+        The same of arrays that are wanted where they are there: all of a mapping, or none is.
     """
     with zipfile.ZipFile(io.BytesIO(content)) as archive:
         members = archive.infolist()
@@ -118,7 +118,8 @@ def read_arrays(
         if sum(member.file_size for member in members) > len(content):
             raise ValueError("it claims to hold more than it does")
         names = [member.filename for member in members]
-        kinds = {**kinds, **(optional if any(f"{name}.npy" in names for name in optional) else {})}
+        for group in optional:
+            kinds = {**kinds, **(group if any(f"{name}.npy" in names for name in group) else {})}
         for name in kinds:
             if names.count(f"{name}.npy") != 1:
                 raise ValueError(f"it should hold {name} once")

@@ -7,7 +7,7 @@ meta.json
     checksum. It is replaced atomically, and that is the commit: files it does not name do not
     count. It holds nothing that differs between two builds of one configuration.
 elites-<births>.npz
-    Elites, pending children and lineages under way, plain arrays.
+    Elites, pending children, lineages under way and contenders, plain arrays.
 centroids.npy
     Of a tessellation only: its centroids, a plain array, written once. Reading an archive never
     makes them again, so that no version of a library can move its niches.
@@ -180,6 +180,8 @@ class Writer:
         if not (state.pending.lineage.any() or len(state.lineages)):
             # As archives were before there were lineages.
             arrays = {name: array for name, array in arrays.items() if LINEAGE not in name}
+        if len(state.contenders):
+            arrays |= {f"contender_{name}": column for name, column in state.contenders.columns().items()}
         buffer = io.BytesIO()
         np.savez(buffer, allow_pickle=False, **arrays)
         elites = self._write(f"elites-{state.births:09d}.npz", buffer.getvalue())

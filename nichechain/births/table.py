@@ -14,7 +14,8 @@ parent_niche, child_niche : int32
 behavior_0, behavior_1, ... : float64, null where the child failed
 objective : float64, null where the child failed, or where the search has none
 accepted : bool
-    Whether the child became its niche's elite, births being offered one by one.
+    Whether the child became its niche's elite, births being offered one by one. In a direct search for
+    evolvability this is who filled an empty niche: who wins a contest does so later.
 failed : string
     Why its evaluation failed, null where it did not.
 step : int32

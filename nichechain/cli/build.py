@@ -16,7 +16,7 @@ import tyro
 from nichechain.cli import output, parsing, progress
 from nichechain.core.checks import DomainOption, StepBound
 from nichechain.core.errors import NichechainError
-from nichechain.search.config import MOST_FAILED, BuildConfig, SearchConfig
+from nichechain.search.config import MOST_FAILED, BuildConfig, ObjectiveName, SearchConfig
 
 if TYPE_CHECKING:
     from nichechain.domains.base import Domain
@@ -43,7 +43,8 @@ class BuildCommand(SearchConfig):
     GROUPS: ClassVar[Mapping[str, tuple[str, ...]]] = {
         "niche": ("grid", "niches", "bounds", "outside", "niches_seed"),
         "mutation": ("mutation", "scale", "df", "step_bound", "layer_scales", "self_adaptive"),
-        "search": ("initial", "batch", "replacement"),
+        "search": ("initial", "batch"),
+        "elite": ("replacement", "objective", "offspring", "objective_l", "objective_lineages"),
         "parent": ("selection", "temperature", "selection_l", "selection_lineages"),
         "lineage": ("lineage_share", "lineage_length", "lineage_brood"),
         "domain": ("domain_seed", "descriptor", "controller", "steps", "noise", "repeats", "options"),
@@ -86,6 +87,11 @@ class BuildCommand(SearchConfig):
     """Generations of the lineages that a selection asks the chain about."""
     selection_lineages: Annotated[int | None, parsing.option("INT", "1 for reach, else 100")] = None
     """How many lineages it asks about."""
+    objective: ObjectiveName = "domain"
+    """What is best, where --replacement is objective: the domain's own objective, or the l-evolvability of
+    the genotype, by offspring that it gets before it is compared with another of its niche."""
+    objective_lineages: Annotated[int | None, parsing.option("INT", "--offspring")] = None
+    """How many lineages, of which each begins with another child."""
     grid: Annotated[str | None, parsing.option("NXxNY", _GRID)] = None
     """Cells of the grid along each axis of behavior."""
     niches: Annotated[str | None, parsing.option("cvt:N", "a grid")] = None

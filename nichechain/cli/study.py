@@ -6,14 +6,14 @@ import shlex
 from collections.abc import Sequence
 from dataclasses import KW_ONLY, dataclass, fields, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
 from nichechain.cli import output, parsing, progress
 from nichechain.cli.build import BuildCommand
 from nichechain.core.errors import NichechainError
-from nichechain.search.config import SearchConfig
+from nichechain.search.config import ObjectiveName, SearchConfig
 
 if TYPE_CHECKING:
     from nichechain.studies.searches.study import SelectionStudy
@@ -54,6 +54,9 @@ class SelectionCommand(BuildCommand):
     offspring: int = 20
     """Fresh offspring of each of these."""
     selection: tyro.conf.Suppress[str] = "uniform"
+    objective: tyro.conf.Suppress[ObjectiveName] = "domain"
+    objective_l: tyro.conf.Suppress[int] = 1
+    objective_lineages: tyro.conf.Suppress[int | None] = None
     resume: tyro.conf.Suppress[bool] = False
     force: tyro.conf.Suppress[bool] = False
     seeds: tyro.conf.Suppress[str | None] = None
@@ -63,6 +66,10 @@ class SelectionCommand(BuildCommand):
     def folder(self) -> Path:
         """Where the study goes."""
         return self.out or Path(f"selection-{self.domain.replace(':', '-').replace('/', '-')}")
+
+    def settings(self) -> dict[str, Any]:
+        """Those of the searches, of which none judges genotypes by offspring."""
+        return {**super().settings(), "offspring": SearchConfig.offspring}
 
     def study(self) -> SelectionStudy:
         """What is asked for, checked."""

@@ -9,10 +9,10 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
-from scipy.special import gammaln
 
 from nichechain.core.checks import as_whole, check_at_least, check_whole
 from nichechain.core.errors import NichechainError
+from nichechain.core.rarefaction import distinct_among
 from nichechain.core.row_sampler import RowSampler
 
 Floats = NDArray[np.float64]
@@ -338,13 +338,7 @@ def rarefied_coverage(counts: ArrayLike, size: int, *, counted: int | None = Non
     total = int(observed.sum())
     if not 1 <= size <= total:
         raise NichechainError(f"size is {size}, but must be between 1 and the {total} offspring observed")
-    niches = observed[: _counted(counted, observed.size)]
-    others = total - niches[niches > 0]
-    possible = others[others >= size].astype(np.float64)
-    log_missed = (
-        gammaln(possible + 1) - gammaln(possible - size + 1) - gammaln(total + 1) + gammaln(total - size + 1)
-    )
-    return float(others.size - np.exp(log_missed).sum())
+    return distinct_among(observed[: _counted(counted, observed.size)], total, size)
 
 
 def _sizes(lineages: ArrayLike) -> Ints:

@@ -26,6 +26,7 @@ Outside = Literal["state", "absorb", "clip"]
 NichesKind = Literal["grid", "cvt"]
 MutationName = Literal["cauchy", "gaussian", "student-t", "uniform-ball"]
 SelectionName = Literal["uniform", "curiosity", "reach", "l-evolvability", "information"]
+ObjectiveName = Literal["domain", "l-evolvability"]
 
 _MIXTURE = "'reach:0.7,uniform:0.3'"
 
@@ -99,6 +100,18 @@ class SearchConfig:
         With 1 each begins at an elite of its own.
     replacement : {"random", "first", "newest", "objective"}
         Which birth of a niche is its elite: each alike, the first, the last, or the best.
+    objective : {"domain", "l-evolvability"}
+        What is best: the domain's own objective, or the l-evolvability of the genotype, from offspring
+        that it gets for that, see :mod:`nichechain.search.contests`. The latter needs ``objective`` as
+        replacement.
+    offspring : int
+        Children that a genotype must have had before its l-evolvability is compared. The births that it
+        takes are births of the search.
+    objective_l : int
+        Generations of the lineages that l-evolvability counts. With 1 it is measured by children alone;
+        with more, lineages go on from there as the chain of the births so far says.
+    objective_lineages : int, optional
+        How many lineages, by default ``offspring``, and at most that.
     outside : {"state", "absorb", "clip"}
         Where a behavior out of bounds belongs: a state of its own, one never left, or the nearest
         niche.
@@ -128,6 +141,10 @@ class SearchConfig:
     lineage_length: int = 10
     lineage_brood: int = BROOD
     replacement: Replacement = "random"
+    objective: ObjectiveName = "domain"
+    offspring: int = 10
+    objective_l: int = 1
+    objective_lineages: int | None = None
     outside: Outside = "state"
     seed: int = 0
     domain_seed: int = 0
@@ -172,10 +189,14 @@ class BuildConfig(SearchConfig):
     def __post_init__(self) -> None:
         if not isinstance(self.domain, str):
             raise NichechainError(f"domain is {self.domain!r}, but must be the name of a domain")
-        asked = [name for name in ("selection_l", "selection_lineages") if getattr(self, name) is not None]
+        asked = [
+            name
+            for name in ("selection_l", "selection_lineages", "objective_lineages")
+            if getattr(self, name) is not None
+        ]
         whole = (
             *("evaluations", "initial", "batch", "seed", "domain_seed", "niches_seed"),
-            *("lineage_length", "lineage_brood", *asked),
+            *("lineage_length", "lineage_brood", "offspring", "objective_l", *asked),
         )
         for name in whole:
             try:
@@ -215,6 +236,7 @@ class BuildConfig(SearchConfig):
         check_at_least(2, lineage_length=self.lineage_length)
         check_at_least(1, lineage_brood=self.lineage_brood)
         check_choice("replacement", self.replacement, get_args(Replacement))
+        self._check_objective()
         check_choice("niches", self.niches, get_args(NichesKind))
         if self.niches == "cvt" and len(self.shape) != 1:
             raise NichechainError(
@@ -225,6 +247,20 @@ class BuildConfig(SearchConfig):
         if self.temperature is not None:
             check_positive(temperature=self.temperature)
             object.__setattr__(self, "temperature", float(self.temperature))
+
+    def _check_objective(self) -> None:
+        check_choice("objective", self.objective, get_args(ObjectiveName))
+        check_at_least(1, offspring=self.offspring, objective_l=self.objective_l)
+        if self.objective_lineages is not None and not 1 <= self.objective_lineages <= self.offspring:
+            raise NichechainError(
+                f"objective_lineages is {self.objective_lineages}, but must be from 1 to offspring, "
+                f"{self.offspring}: each lineage begins with a child of its own"
+            )
+        if self.objective != "domain" and self.replacement != "objective":
+            raise NichechainError(
+                f"objective is {self.objective!r}, so replacement must be 'objective', but replacement is "
+                f"{self.replacement!r}"
+            )
 
     def _repr_html_(self) -> str:
         from nichechain.core.notebook import facts_table

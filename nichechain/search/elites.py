@@ -42,6 +42,12 @@ class Elites(Columnar):
     uid: NDArray[np.int64]
     depth: NDArray[np.int64]
 
+    @classmethod
+    def none(cls, length: int, axes: int) -> Elites:
+        """No elite, of genotypes of that length and behaviors of so many axes."""
+        whole, real = np.empty(0, np.int64), np.empty(0)
+        return cls(whole, np.empty((0, length), np.float32), np.empty((0, axes)), real, real, whole, whole)
+
     def winners(self) -> Elites:
         """Of every state, the one with the largest key; of equal keys, the one with the smallest uid."""
         ordered = self[np.lexsort((self.uid, -self.key, self.niche))]
@@ -64,6 +70,8 @@ class SearchState:
         The last step begun, 0 for the initial births; -1 before them.
     lineages : UnderWay
         Those under way.
+    contenders : Elites
+        Births that contest a niche and have not been judged yet, see :mod:`nichechain.search.contests`.
     """
 
     elites: Elites
@@ -71,12 +79,14 @@ class SearchState:
     births: int
     step: int
     lineages: UnderWay
+    contenders: Elites
 
     @classmethod
     def at_rest(cls, elites: Elites, births: int, step: int) -> SearchState:
         """A state of a search that has nothing under way."""
-        length = elites.genotype.shape[1]
-        return cls(elites, Offspring.none(length), births, step, UnderWay.none(length))
+        length, axes = elites.genotype.shape[1], elites.behavior.shape[1]
+        nobody = Elites.none(length, axes)
+        return cls(elites, Offspring.none(length), births, step, UnderWay.none(length), nobody)
 
 
 class EliteArchive:
@@ -92,6 +102,7 @@ class EliteArchive:
             measures_dtype=np.float64,
             extra_fields={
                 "domain_objective": ((), np.float64),
+                "key": ((), np.float64),
                 "uid": ((), np.int64),
                 "depth": ((), np.int64),
             },
@@ -99,6 +110,7 @@ class EliteArchive:
         self._outside: Elites | None = None
         self._largest_key = [-np.inf] * (len(niches) + 1)
         self._uid = np.full(len(niches) + 1, NONE, np.int64)
+        self._puts = 0
 
     @property
     def filled(self) -> int:
@@ -127,18 +139,23 @@ class EliteArchive:
         return accepted
 
     def put(self, winners: Elites) -> None:
-        """Put in the elites of some states, which were accepted.
+        """Put in the elites of some states, whoever was there before.
 
-        pyribs gets only those in the grid: it would put the others in edge cells without a word.
+        pyribs gets only those in the grid: it would put the others in edge cells without a word. To it
+        the later is the better, since keys are compared here, and may have fallen since they won.
         """
+        self._puts += 1
         self._uid[winners.niche] = winners.uid
+        for state, key in zip(winners.niche.tolist(), winners.key.tolist(), strict=True):
+            self._largest_key[state] = key
         inside = winners[winners.niche < len(self._niches)]
         if len(inside):
             self._grid.add(
                 inside.genotype,
-                inside.key,
+                np.full(len(inside), float(self._puts)),
                 inside.behavior,
                 domain_objective=inside.objective,
+                key=inside.key,
                 uid=inside.uid,
                 depth=inside.depth,
             )
@@ -164,7 +181,7 @@ class EliteArchive:
             data["solution"],
             data["measures"],
             data["domain_objective"],
-            data["objective"],
+            data["key"],
             data["uid"],
             data["depth"],
         )

@@ -3,7 +3,8 @@
 One step: draw parents from the occupied niches, mutate, evaluate, keep. Mutation is left to who
 evaluates. Elites live in a pyribs archive. Which birth of a niche is its elite follows one rule, *the
 largest key wins*, so the elites after N births are a function of the set of births, in whatever order
-they came.
+they came. A direct search for evolvability judges by children instead, see
+:mod:`nichechain.search.contests`.
 Some of the children come from unselected lineages instead, see :mod:`nichechain.search.lineages`.
 """
 
@@ -27,6 +28,7 @@ from nichechain.domains.base import Domain, Evaluation
 from nichechain.execution import Executor
 from nichechain.niches import Niches
 from nichechain.search.config import BuildConfig
+from nichechain.search.contests import UNJUDGED, Contests
 from nichechain.search.elites import EliteArchive, Elites, SearchState
 from nichechain.search.lineages import Stretch, UnderWay
 from nichechain.search.savings import Savings
@@ -54,6 +56,9 @@ class MapElites:
         How parents are drawn, having been told of the births so far; by default each elite alike.
     stretch : Stretch, optional
         The steps to come, by default those of the build.
+    contests : Contests, optional
+        Of a direct search for evolvability, having been told of the births so far. By default births
+        contest no niche: where the objective is evolvability, they only fill empty ones.
 
     Attributes
     ----------
@@ -81,6 +86,7 @@ class MapElites:
         state: SearchState | None = None,
         selection: ParentSelection | None = None,
         stretch: Stretch | None = None,
+        contests: Contests | None = None,
     ) -> None:
         if selection is None and config.selection != "uniform":
             raise NichechainError(
@@ -95,18 +101,20 @@ class MapElites:
         self._config = config
         self._mutate = mutate
         self._stretch = stretch or Stretch.of_build(config)
+        self._contests = contests
         self._archive = EliteArchive(domain, niches)
         self._pending = Offspring.none(domain.genotype_length)
         self._lineages = UnderWay.none(domain.genotype_length)
+        self._contenders = Elites.none(domain.genotype_length, len(niches.bounds))
         self.births = 0
         self.step = -1
         self.savings = Savings()
         self.settled = True
         if state is not None:
-            self._archive.offer(state.elites.niche, state.elites.key)
             self._archive.put(state.elites)
             self._pending = state.pending
             self._lineages = state.lineages
+            self._contenders = state.contenders
             self.births = state.births
             self.step = state.step
 
@@ -115,7 +123,7 @@ class MapElites:
         """The search after its last finished batch."""
         elites = self._archive.elites(self._archive.occupied())
         pending = replace(self._pending, genotype=self._pending.grown())
-        return SearchState(elites, pending, self.births, self.step, self._lineages)
+        return SearchState(elites, pending, self.births, self.step, self._lineages, self._contenders)
 
     @property
     def filled(self) -> int:
@@ -186,6 +194,7 @@ class MapElites:
                 "widen the bounds, keep outside as a state, or raise the number of initial births"
             )
         batch = self._stretch.batch
+        judged = self._judged(step)
         self._selection.begin(step)
         weights = self._selection.weights(occupied, self._archive.uids(occupied))
         rng = keyed(self._config.seed, Purpose.SELECTION, step)
@@ -200,9 +209,16 @@ class MapElites:
         unselected = latest != NONE
         # Parents are the elites that were drawn, and behind them the lineages under way.
         parent[unselected] = len(elites) + latest[unselected]
+        if self._contests is not None:
+            # And behind these, whoever is judged by children.
+            who, rows = np.unique(self._contests.due.parent, return_inverse=True)
+            judged = judged[np.searchsorted(judged.uid, who)]
+            parent[self._contests.due.place] = len(elites) + len(self._lineages) + rows
 
         def whose(name: str) -> NDArray[Any]:
-            of: NDArray[Any] = np.concatenate([getattr(elites, name), getattr(self._lineages, name)])
+            of: NDArray[Any] = np.concatenate(
+                [getattr(those, name) for those in (elites, self._lineages, judged)]
+            )
             return of
 
         uid = self._first_uid(step) + np.arange(batch)
@@ -225,6 +241,25 @@ class MapElites:
             unselected,
         )
 
+    def _judged(self, step: int) -> Elites:
+        """End contests before a step; elites and contenders that it may judge, sorted by uid."""
+        if self._contests is None:
+            return self._contenders
+        self._contests.begin(step)
+        ended = self._contests.settled
+        if len(ended):
+            both = self._contestants(ended.niche)
+            won = both[np.searchsorted(both.uid, ended.uid)]
+            self._archive.put(replace(won, key=ended.value))
+            self._contenders = self._contenders[~np.isin(self._contenders.niche, ended.niche)]
+        return self._contestants(self._contests.due.niche)
+
+    def _contestants(self, niche: Ints) -> Elites:
+        """Elites and contenders of some niches, which may repeat, sorted by uid."""
+        elites = self._archive.elites(np.unique(niche))
+        both = Elites.concatenate([elites, self._contenders[np.isin(self._contenders.niche, niche)]])
+        return both[np.argsort(both.uid)]
+
     def _first_uid(self, step: int) -> int:
         return self._stretch.uids(step)[0]
 
@@ -240,21 +275,32 @@ class MapElites:
         accepted[fine] = self._archive.offer(niche[fine], keys[fine])
         # Of each niche the last that was accepted stays. Only what stays, or has children, is grown here.
         last = {state: row for row, state in enumerate(niche.tolist()) if accepted[row]}
-        winners = np.array(sorted(last.values()), np.int64)
-        self._archive.put(
-            Elites(
-                niche[winners],
-                offspring[winners].grown(),
-                evaluation.behavior[winners].astype(np.float64),
-                evaluation.objective[winners],
-                keys[winners],
-                offspring.uid[winners],
-                offspring.depth[winners],
+
+        def kept(rows: Ints) -> Elites:
+            return Elites(
+                niche[rows],
+                offspring[rows].grown(),
+                evaluation.behavior[rows].astype(np.float64),
+                evaluation.objective[rows],
+                keys[rows],
+                offspring.uid[rows],
+                offspring.depth[rows],
             )
-        )
+
+        self._archive.put(kept(np.array(sorted(last.values()), np.int64)))
         self._lineages = self._gone_on(offspring, niche, slot, of_lineages)
-        step = np.full(len(offspring), self.step)
-        self._selection.tell(Told(offspring.parent_uid, offspring.parent_niche, niche, accepted, step))
+        told = Told(
+            offspring.parent_uid,
+            offspring.parent_niche,
+            niche,
+            accepted,
+            np.full(len(offspring), self.step),
+            offspring.uid,
+            offspring.lineage,
+        )
+        self._selection.tell(told)
+        if self._contests is not None:
+            self._contenders = Elites.concatenate([self._contenders, kept(self._contests.hear(told))])
         return births.make_table(offspring, evaluation, child_niche=niche, accepted=accepted, step=self.step)
 
     def _gone_on(
@@ -286,5 +332,8 @@ class MapElites:
                 return -uid.astype(np.float64)
             case "newest":
                 return uid.astype(np.float64)
-            case "objective":
+            case "objective" if self._config.objective == "domain":
                 return objective
+            case "objective":
+                # Nobody is judged at birth, and the first in a niche is its elite.
+                return np.full(len(uid), UNJUDGED)

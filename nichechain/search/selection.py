@@ -39,7 +39,9 @@ class Told(Columnar):
         ``NONE`` where the evaluation failed.
     accepted : (N,) bool array
         Whether the child became its niche's elite, see :mod:`nichechain.births.table`.
-    step : (N,) int64 array
+    step, uid : (N,) int64 arrays
+    lineage : (N,) bool array
+        Whose parent is the latest birth of a lineage.
     """
 
     parent_uid: Ints
@@ -47,20 +49,22 @@ class Told(Columnar):
     child_niche: Ints
     accepted: Bools
     step: Ints
+    uid: Ints
+    lineage: Bools
 
     @classmethod
     def of(cls, births: pa.Table) -> Told:
         """Of rows of a table of births."""
-        parent, niche, child = (
+        parent, niche, child, step, uid = (
             births[name].fill_null(NONE).to_numpy().astype(np.int64)
-            for name in ("parent_uid", "parent_niche", "child_niche")
+            for name in ("parent_uid", "parent_niche", "child_niche", "step", "uid")
         )
-        accepted = births["accepted"].to_numpy(zero_copy_only=False)
-        return cls(parent, niche, child, accepted, births["step"].to_numpy().astype(np.int64))
+        accepted, lineage = (births[name].to_numpy(zero_copy_only=False) for name in ("accepted", "lineage"))
+        return cls(parent, niche, child, accepted, step, uid, lineage)
 
 
-class ParentSelection(Protocol):
-    """How likely each elite is to become a parent, by what births have shown so far."""
+class Listener(Protocol):
+    """Who is told of every birth, in their order, and of every step that draws parents."""
 
     def tell(self, births: Told) -> None:
         """What became of some births."""
@@ -69,6 +73,10 @@ class ParentSelection(Protocol):
     def begin(self, step: int) -> None:
         """All births before a step have been told, and its parents are drawn next."""
         ...
+
+
+class ParentSelection(Listener, Protocol):
+    """How likely each elite is to become a parent, by what births have shown so far."""
 
     def weights(self, niche: Ints, uid: Ints) -> Floats | None:
         """Weight of each of some elites, (K,), not negative.
@@ -181,12 +189,12 @@ def draw_parents(weights: Floats | None, elites: int, size: int, rng: np.random.
     return rng.choice(elites, size=size, p=weights / weights.sum())
 
 
-def retrace(selection: ParentSelection, births: Told) -> None:
-    """Tell a new selection of the births of a search so far, as the search would have.
+def retrace(listener: Listener, births: Told) -> None:
+    """Tell a new selection, or contests, of the births of a search so far, as the search would have.
 
     Parameters
     ----------
-    selection : ParentSelection
+    listener : Listener
     births : Told
         In their order; the last step need not be whole.
     """
@@ -195,5 +203,5 @@ def retrace(selection: ParentSelection, births: Told) -> None:
         step = int(births.step[start])
         # Initial births have no parents to be drawn.
         if step:
-            selection.begin(step)
-        selection.tell(births[start:end])
+            listener.begin(step)
+        listener.tell(births[start:end])

@@ -12,13 +12,16 @@ from __future__ import annotations
 
 from nichechain.niches import Niches
 from nichechain.search.config import BuildConfig, SelectionName, parse_selection
+from nichechain.search.contests import Contests
+from nichechain.search.lineages import Stretch
 from nichechain.search.parents import CuriousParents
 from nichechain.search.selection import Mixture, ParentSelection, Tempered, UniformParents
+from nichechain.steering.direct import OffspringCoverage, OffspringLineages
 from nichechain.steering.evolvable import EvolvableParents
 from nichechain.steering.information import InformedParents
 from nichechain.steering.reach import ReachParents
 
-__all__ = ["make_selection"]
+__all__ = ["make_contests", "make_selection"]
 
 _SHARPENED = 0.3
 """Temperature of selections that ask the chain. In trials of ``reach`` on arms and maps, 0.5, 0.3 and 0.2
@@ -38,6 +41,22 @@ def make_selection(config: BuildConfig, niches: Niches) -> ParentSelection:
     parts = parse_selection(config.selection)
     selections = [_make(name, config, niches) for name, _ in parts]
     return selections[0] if len(parts) == 1 else Mixture(selections, [share for _, share in parts])
+
+
+def make_contests(config: BuildConfig, niches: Niches) -> Contests | None:
+    """The contests of a direct search for evolvability, before any birth; None for any other search.
+
+    Parameters
+    ----------
+    config : BuildConfig
+    niches : Niches
+    """
+    if config.objective == "domain":
+        return None
+    l, lineages = config.objective_l, config.objective_lineages or config.offspring
+    by = OffspringCoverage(niches, lineages) if l == 1 else OffspringLineages(niches, l, lineages)
+    contested = len(niches) if niches.outside == "absorb" else niches.states
+    return Contests(Stretch.of_build(config), contested, config.offspring, by)
 
 
 def _make(name: SelectionName, config: BuildConfig, niches: Niches) -> ParentSelection:

@@ -136,14 +136,26 @@ def many_lineages(chain: OnlineChain, targets: Ints, l: int, lineages: int) -> F
     whole = np.zeros(chain.niches.states)
     for start in range(0, targets.size, _COLUMNS):
         some = targets[start : start + _COLUMNS]
-        on_target = some, np.arange(some.size)
-        visit = np.zeros((whole.size, some.size))
-        visit[on_target] = 1.0
-        for _ in range(l - 1):
-            visit = chain @ visit
-            # A lineage that stands on its target has visited it, wherever it goes next.
-            visit[on_target] = 1.0
-        visit = np.minimum(chain @ visit, 1.0)
+        visit = np.minimum(chain @ hits(chain, some, l - 1), 1.0)
         with np.errstate(divide="ignore"):
             whole += -np.expm1(lineages * np.log1p(-visit)).sum(axis=1)
     return whole
+
+
+def hits(chain: OnlineChain, targets: Ints, steps: int) -> Floats:
+    """Probability that a lineage stands on each of some niches, or enters it within so many steps, (S, c).
+
+    Parameters
+    ----------
+    chain : OnlineChain
+    targets : (c,) int64 array
+    steps : int
+    """
+    on_target = targets, np.arange(targets.size)
+    visit = np.zeros((chain.niches.states, targets.size))
+    visit[on_target] = 1.0
+    for _ in range(steps):
+        visit = chain @ visit
+        # A lineage that stands on its target has visited it, wherever it goes next.
+        visit[on_target] = 1.0
+    return visit

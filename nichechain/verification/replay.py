@@ -8,13 +8,12 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from nichechain.births.table import NONE, Offspring
+from nichechain.births.table import NONE
 from nichechain.core.randomness import Purpose, keyed
 from nichechain.domains.base import Domain, Evaluation
 from nichechain.execution import Executor
 from nichechain.niches import Niches
-from nichechain.search.elites import Elites
-from nichechain.search.lineages import UnderWay
+from nichechain.search.elites import Elites, SearchState
 from nichechain.variation import Mutation
 from nichechain.verification.record import Ints, Run, differs, largest_difference
 from nichechain.verification.result import EVALUATION, GENOTYPES, Check
@@ -101,8 +100,9 @@ class Regrowth:
     parent_uid : (N,) int64 array
         Of all births.
     elites : Elites
-    pending : Offspring
-    lineages : UnderWay
+        Those of the archive.
+    state : SearchState
+        Where else genotypes are stored.
     wanted : (K,) int64 array
         Births whose genotypes are asked for, sorted.
     """
@@ -110,8 +110,7 @@ class Regrowth:
     runs: Sequence[Run]
     parent_uid: Ints
     elites: Elites
-    pending: Offspring
-    lineages: UnderWay
+    state: SearchState
     wanted: Ints
     _apart: dict[int, float | None] = field(default_factory=dict)
 
@@ -124,8 +123,10 @@ class Regrowth:
     ) -> Iterator[Float32s]:
         """Those that are wanted, in order."""
         stored = dict(zip(self.elites.uid.tolist(), self.elites.genotype, strict=True))
-        stored |= dict(zip(self.pending.uid.tolist(), self.pending.grown(), strict=True))
-        stored |= dict(zip(self.lineages.uid.tolist(), self.lineages.genotype, strict=True))
+        pending, lineages, contenders = self.state.pending, self.state.lineages, self.state.contenders
+        stored |= dict(zip(pending.uid.tolist(), pending.grown(), strict=True))
+        stored |= dict(zip(lineages.uid.tolist(), lineages.genotype, strict=True))
+        stored |= dict(zip(contenders.uid.tolist(), contenders.genotype, strict=True))
         wanted = set(self.wanted.tolist())
         for run in self.runs:
             grown = replayed(
@@ -150,9 +151,13 @@ class Regrowth:
         checks = []
         for who, uids in (
             ("elites", self.elites.uid),
-            ("pending children", self.pending.uid),
-            ("lineages under way", self.lineages.uid),
+            ("pending children", self.state.pending.uid),
+            ("lineages under way", self.state.lineages.uid),
+            ("contenders", self.state.contenders.uid),
         ):
+            if who == "contenders" and not len(uids):
+                # Only a direct search for evolvability has any.
+                continue
             odd = [int(uid) in self._apart for uid in uids]
             sizes = [self._apart.get(int(uid)) or 0.0 for uid in uids]
             checks.append(
@@ -169,15 +174,18 @@ class Regrowth:
 
     def _targets(self, run: Run) -> Ints:
         """Numbers within the run of all genotypes that are compared or wanted."""
-        uids = np.unique(np.concatenate([self.elites.uid, self.lineages.uid, self.wanted]))
+        state = self.state
+        uids = np.unique(
+            np.concatenate([self.elites.uid, state.lineages.uid, state.contenders.uid, self.wanted])
+        )
         own = uids[(uids >= run.first_uid) & (uids < run.first_uid + run.births)] - run.first_uid
-        return np.concatenate([own, self.pending.uid])
+        return np.concatenate([own, state.pending.uid])
 
     def _parents(self, run: Run) -> Ints:
         """Parents by their numbers within the run, those of pending children last."""
         own = self.parent_uid[run.rows]
         within = np.where(own == NONE, NONE, own - run.first_uid)
-        return np.concatenate([within, self.pending.parent_uid])
+        return np.concatenate([within, self.state.pending.parent_uid])
 
 
 # Enough for every worker, little to hold.

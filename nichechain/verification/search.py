@@ -22,7 +22,7 @@ from nichechain.search.config import BuildConfig
 from nichechain.search.elites import Elites, SearchState
 from nichechain.search.lineages import Stretch, UnderWay
 from nichechain.search.map_elites import MapElites
-from nichechain.steering import make_selection
+from nichechain.steering import make_contests, make_selection
 from nichechain.variation.brood import Brood
 from nichechain.verification.record import Births, Bools, Run, differs, largest_difference
 from nichechain.verification.result import SEARCH, Check
@@ -73,7 +73,11 @@ def search_again(
         if state is not None:
             state = SearchState.at_rest(state.elites, state.births, state.step)
         selection = make_selection(config, niches)
-        search = MapElites(domain, niches, lambda parent, _: parent, config, state, selection, stretch)
+        # Births that were added to a build contest nothing.
+        contests = make_contests(config, niches) if state is None else None
+        search = MapElites(
+            domain, niches, lambda parent, _: parent, config, state, selection, stretch, contests
+        )
         while search.births < end:
             rows.append(search.advance(record, end - search.births, on_done))
         state = search.state
@@ -92,7 +96,9 @@ def search_again(
         parent_uid=_moved(state.pending.parent_uid, run.first_uid),
     )
     lineages = replace(state.lineages, uid=state.lineages.uid + run.first_uid)
-    return Again(numbered, replace(state, elites=elites, pending=pending, lineages=lineages))
+    contenders = replace(state.contenders, uid=state.contenders.uid + run.first_uid)
+    ended = replace(state, elites=elites, pending=pending, lineages=lineages, contenders=contenders)
+    return Again(numbered, ended)
 
 
 def _stretches(run: Run) -> Iterator[tuple[BuildConfig, int, Stretch]]:
@@ -177,6 +183,21 @@ def check_lineages_again(lineages: UnderWay, again: UnderWay) -> list[Check]:
     wrong = (lineages.slot != again.slot) | (lineages.uid != again.uid)
     wrong |= (lineages.niche != again.niche) | (lineages.depth != again.depth)
     return [_check(name, wrong, lineages.uid)]
+
+
+def check_contenders_again(contenders: Elites, again: Elites) -> list[Check]:
+    """Whether births that contest a niche are those that follow from the births; none where nobody does."""
+    name = "contenders are the births that contest a niche"
+    if not len(contenders) and not len(again):
+        return []
+    if len(contenders) != len(again):
+        uids = tuple(again.uid[:1].tolist()) or tuple(contenders.uid[:1].tolist())
+        number = max(len(contenders), len(again))
+        return [Check(name, _GROUP, number, number, uids, None, SEARCH)]
+    wrong = (contenders.uid != again.uid) | (contenders.niche != again.niche)
+    wrong |= (contenders.depth != again.depth) | differs(contenders.behavior, again.behavior)
+    wrong |= differs(contenders.objective, again.objective) | differs(contenders.key, again.key)
+    return [_check(name, wrong, contenders.uid)]
 
 
 def _check(name: str, wrong: Bools, uids: NDArray[np.int64], difference: float | None = None) -> Check:

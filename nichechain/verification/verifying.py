@@ -25,6 +25,7 @@ from nichechain.verification.record import Births, Ints, Run, largest_difference
 from nichechain.verification.replay import Regrowth, check_evaluations, evaluated
 from nichechain.verification.result import EVALUATION, SEARCH, Check, Difference, Verification
 from nichechain.verification.search import (
+    check_contenders_again,
     check_lineages_again,
     check_pending_again,
     check_search,
@@ -200,6 +201,7 @@ class _Work:
         if self.archive.meta.origin is None:
             self.checks += check_pending_again(state.pending, made[0].state.pending)
             self.checks += check_lineages_again(state.lineages, made[0].state.lineages)
+            self.checks += check_contenders_again(state.contenders, made[0].state.contenders)
 
     def _tessellation(self) -> None:
         """Whether the centroids that are kept are those that the configuration's seed gives."""
@@ -234,7 +236,7 @@ class _Work:
         self.sampled_elites, self.sampled_births = len(chosen), len(some)
         evaluating = self._tell("evaluations", len(chosen) + len(some))
         if rooted:
-            regrowth = Regrowth(runs, births.parent_uid, elites, state.pending, state.lineages, some)
+            regrowth = Regrowth(runs, births.parent_uid, elites, state, some)
             making = self._tell("genotypes", regrowth.needed())
             grown = regrowth.genotypes(domain, mutate, making)
             again = evaluated(domain, grown, axes, self.executor, evaluating)

@@ -7,7 +7,7 @@ the run's seed and the step. So a walk depends neither on the walks beside it no
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pyarrow as pa
@@ -26,6 +26,7 @@ from nichechain.variation import Mutation
 from nichechain.variation.brood import Brood
 from nichechain.walks.config import WalkConfig, run_seed
 from nichechain.walks.diversity import NoveltyArchive, Surroundings
+from nichechain.walks.litters import Litters, Scored
 from nichechain.walks.selection import Scores, draw
 from nichechain.walks.state import StepRecord, WalkState, measure_states
 
@@ -67,7 +68,7 @@ class Walks:
     Raises
     ------
     NichechainError
-        If the niche variant is asked for without niches.
+        If the niche variant, or a metric that counts niches, is asked for without niches.
     """
 
     def __init__(
@@ -75,6 +76,8 @@ class Walks:
     ) -> None:
         if config.other_niche and niches is None:
             raise NichechainError("other_niche is asked for, but a niche walk needs niches: none are given")
+        if config.metric.litter and niches is None:
+            raise NichechainError("metric counts the niches of offspring, but no niches are given")
         self._domain = domain
         self._mutate = mutate
         self._config = config
@@ -197,15 +200,32 @@ class Walks:
         niche = np.concatenate([state.niche, landed.reshape(walks, -1)], axis=1)
         behavior = np.concatenate([state.behavior, children], axis=1)
         failed = evaluation.failed.reshape(walks, -1)
-        score = config.metric(behavior, self._lineage, self._itself, self._around(state, children))
-        chosen, stalled = self._select(state, seeds, score, failed, niche)
-
-        rows = np.arange(walks)[:, None]
         everyone = {
             "uid": np.concatenate([state.uid, offspring.uid.reshape(walks, -1)], axis=1),
             "depth": np.concatenate([state.depth, offspring.depth.reshape(walks, -1)], axis=1),
             "niche": niche,
         }
+        around = self._around(state, children)
+        judging = None
+        if config.metric.litter:
+            assert self._niches is not None
+            grown = offspring.grown().reshape(*children.shape[:2], -1)
+            judging = Litters.born(
+                Scored(np.concatenate([state.genotype, grown], axis=1), **everyone),
+                self._mutate,
+                seeds,
+                state.run,
+                first=self._first_uid(state) + children.shape[1],
+                each=config.metric.litter,
+                step=state.step + 1,
+                niches=self._niches,
+                evaluate=lambda brood: self._evaluate(brood, executor, on_done),
+            )
+            around = replace(around, litters=judging.landed, niches=len(self._niches))
+        score = config.metric(behavior, self._lineage, self._itself, around)
+        chosen, stalled = self._select(state, seeds, score, failed, niche)
+
+        rows = np.arange(walks)[:, None]
         path = np.concatenate(
             [state.path[rows, self._lineage[chosen]], behavior[rows, chosen][:, :, None]], axis=2
         )
@@ -230,6 +250,8 @@ class Walks:
             step=after.step,
             run=np.repeat(state.run, len(offspring) // len(state.run)),
         )
+        if judging is not None:
+            table = pa.concat_tables([table, judging.births])
         return Step(after, record, table)
 
     def _evaluate(
@@ -246,7 +268,7 @@ class Walks:
         """Children of all states: run by run, state by state."""
         each = self._config.offspring
         walks, width = state.uid.shape
-        first = width + state.step * width * each
+        first = self._first_uid(state)
         uid = first + np.arange(width * each)
         brood = Brood(
             self._mutate,
@@ -264,6 +286,11 @@ class Walks:
             np.repeat(state.depth.ravel() + 1, each),
             np.zeros(walks * width * each, bool),
         )
+
+    def _first_uid(self, state: WalkState) -> int:
+        """Number of the first child of a step: before it are the starts, and what earlier steps made."""
+        width, each, litter = self._config.width, self._config.offspring, self._config.metric.litter
+        return width + state.step * (width * each + (width + width * each) * litter)
 
     def _genotypes(self, state: WalkState, offspring: Offspring, chosen: Ints) -> NDArray[np.float32]:
         """Those of the chosen columns (R, μ, P): only children that follow are grown here."""

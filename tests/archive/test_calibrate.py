@@ -228,6 +228,7 @@ def test_workers_change_nothing(pristine: Path, more: Path, tmp_path: Path) -> N
         {"lineage_share": 0.0},
         {"outside": "absorb", "replacement": "objective"},
         {"selection": "curiosity", "replacement": "newest"},
+        {"objective": "l-evolvability", "replacement": "objective", "offspring": 3},
         {"niches": "cvt", "shape": (20,), "self_adaptive": True},
     ],
     ids=str,

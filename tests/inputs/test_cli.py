@@ -86,6 +86,10 @@ TABLE: tuple[tuple[str, str, tuple[str, ...], Bad], ...] = (
             "lineage_length": ("1", *_COUNT),
             "lineage_brood": _COUNT,
             "replacement": _UNKNOWN,
+            "objective": ("l-evolvability", *_UNKNOWN),
+            "offspring": _COUNT,
+            "objective_l": _COUNT,
+            "objective_lineages": ("11", *_COUNT),
             "outside": _UNKNOWN,
             "seed": _NATURAL,
             "seeds": ("3..1", "a", "0..", "1,1", "-1", "1.5", ""),
@@ -476,6 +480,9 @@ FREE = {
     ),
     # Shown and tried where a search is built alone.
     "selection": "a study has several",
+    "objective": "a study of selections has the domain's",
+    "objective_l": "a study of selections has the domain's",
+    "objective_lineages": "a study of selections has the domain's",
     "max_failed": "a study takes the default",
     "seeds": "a study has runs",
 }

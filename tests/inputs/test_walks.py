@@ -69,6 +69,9 @@ CALLS = (
     Call("walks.diversity.make", lambda w: {"name": "knn"}, {"name": UNKNOWN}),
     Call("walks.diversity.KNearest", lambda w: {}, {"k": whole(0)}),
     Call(
+        "walks.diversity.OffspringNiches", lambda w: {}, {"offspring": whole(0), "lineages": (11, *whole(0))}
+    ),
+    Call(
         "walks.diversity.KernelDensity",
         lambda w: {},
         {

@@ -113,7 +113,7 @@ def test_scores_are_a_fold_over_births_in_any_order(births, random):
         cut = len(rows) // 3
         for part in (rows[:cut], rows[cut:]):
             uid, none = np.array([p for p, _ in part], np.int64), np.zeros(len(part), np.int64)
-            parents.tell(Told(uid, none, none, np.array([a for _, a in part], bool), none))
+            parents.tell(Told(uid, none, none, np.array([a for _, a in part], bool), none, none, none > 0))
         found.append(parents.scores(np.arange(5)))
     np.testing.assert_array_equal(*found)
     for uid in range(5):
@@ -126,7 +126,7 @@ def test_elites_are_drawn_in_proportion_to_their_score_or_the_floor():
     uid = np.array([0] * 6 + [2, 2] + [3] * 2)
     accepted = np.array([False] * 6 + [True, False] + [True] * 2)
     none = np.zeros(uid.size, np.int64)
-    parents.tell(Told(uid, none, none, accepted, none))
+    parents.tell(Told(uid, none, none, accepted, none, none, none > 0))
     expected = np.array([FLOOR, FLOOR, 0.5, 2.0])
     weights = parents.weights(np.zeros(4, np.int64), np.arange(4))
     np.testing.assert_array_equal(weights, expected)

@@ -56,7 +56,7 @@ def test_nobody_of_no_weight_is_drawn():
 
 def test_births_are_told_step_by_step_as_they_came():
     none = np.zeros(5, np.int64)
-    births = Told(none, none, np.array([3, 1, 4, 1, 5]), none.astype(bool), np.array([0, 0, 1, 1, 3]))
+    births = Told(none, none, np.array([3, 1, 4, 1, 5]), none > 0, np.array([0, 0, 1, 1, 3]), none, none > 0)
     parents = Given()
     retrace(Mixture([parents, Given()], [0.5, 0.5]), births)
     assert parents.heard == [[3, 1], "step 1", [4, 1], "step 3", [5]]

@@ -22,7 +22,7 @@ def births(size: int = 600) -> Told:
     parent = rng.choice(31, size=size, p=np.array([*[1.0] * 28, 0.1, 0.1, 0.1]) / 28.3)
     child = (parent + rng.integers(0, 1 + parent // 4, size)) % 30
     none = np.zeros(size, np.int64)
-    return Told(parent + 100, parent, child, none.astype(bool), none + 1)
+    return Told(parent + 100, parent, child, none.astype(bool), none + 1, none, none.astype(bool))
 
 
 @pytest.fixture(scope="module")
@@ -73,7 +73,7 @@ def test_niches_that_little_is_known_of_are_preferred():
     assert weights[28:].min() > np.median(weights)
     before = weights[29] / weights[5]
     one = np.full(50, 29)
-    parents.tell(Told(one, one, np.arange(50) % 30, one.astype(bool), one))
+    parents.tell(Told(one, one, np.arange(50) % 30, one.astype(bool), one, one, one < 0))
     parents.begin(2)
     weights = parents.weights(states, states)
     assert weights[29] / weights[5] < before

@@ -14,7 +14,8 @@ from nichechain.steering.online import OnlineChain
 
 def told(parent, child, elite) -> Told:
     none = np.zeros(len(parent), np.int64)
-    return Told(np.asarray(elite), np.asarray(parent), np.asarray(child), none.astype(bool), none)
+    nobody = none.astype(bool)
+    return Told(np.asarray(elite), np.asarray(parent), np.asarray(child), nobody, none, none, nobody)
 
 
 def drifting(size: int, states: int, seed: int) -> Told:

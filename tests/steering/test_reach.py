@@ -35,7 +35,7 @@ def births(size: int = 300) -> Told:
     parent = rng.integers(10, size=size)
     child = np.clip(parent + rng.integers(-2, 3, size), 0, 9)
     none = np.zeros(size, np.int64)
-    return Told(parent + 100, parent, child, none.astype(bool), none + 1)
+    return Told(parent + 100, parent, child, none.astype(bool), none + 1, none, none.astype(bool))
 
 
 @pytest.fixture(scope="module")
@@ -94,7 +94,7 @@ def test_an_elite_s_record_corrects_the_forecast(online):
     # Ten children of one elite, of which one is the first in its niche.
     one = np.ones(10, np.int64)
     child = np.array([15] + [3] * 9)
-    parents.tell(Told(one * 9, one * 9, child, one.astype(bool), one))
+    parents.tell(Told(one * 9, one * 9, child, one.astype(bool), one, one, one < 0))
     told = parents.weights(np.array([9, 9]), np.array([9, 8]))
     np.testing.assert_allclose(told[0] / told[1], 2.0 / (1.0 + 10 * forecast[9]), rtol=1e-9)
 
@@ -102,7 +102,7 @@ def test_an_elite_s_record_corrects_the_forecast(online):
 def test_nobody_is_preferred_once_all_niches_are_filled():
     parents = ReachParents(NICHES, 40)
     every = np.arange(20)
-    parents.tell(Told(every, every, every, every == every, np.ones(20, np.int64)))
+    parents.tell(Told(every, every, every, every == every, np.ones(20, np.int64), every, every < 0))
     parents.begin(1)
     assert parents.weights(every, every) is None
 

@@ -61,6 +61,7 @@ def test_a_genuine_archive_is_verified_in_full(genuine: Archive) -> None:
         {"niches": "cvt", "shape": (30,)},
         {"self_adaptive": True},
         {"selection": "curiosity"},
+        {"objective": "l-evolvability", "replacement": "objective", "offspring": 3},
         {"step_bound": ("rescaled", 0.5)},
         {"evaluations": 30},
         {"evaluations": 338},

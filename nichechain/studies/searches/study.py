@@ -68,6 +68,11 @@ class SelectionStudy:
     def __post_init__(self) -> None:
         check_at_least(2, runs=self.runs, offspring=self.offspring)
         check_at_least(0, elites=self.elites)
+        if self.config.objective != "domain":
+            raise NichechainError(
+                f"objective is {self.config.objective!r}, but a study of selections compares searches that "
+                "keep what the domain's objective or replacement says"
+            )
         if isinstance(self.selections, str):
             raise NichechainError(
                 f"selections is {self.selections!r}, but must be several, such as ('uniform', 'reach')"

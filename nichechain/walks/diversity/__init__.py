@@ -1,6 +1,7 @@
 """Diversity metrics G of behaviors, and the archive of behaviors they remember.
 
-A metric scores the behaviors of many walks at once; larger means more diverse.
+A metric scores the behaviors of many walks at once; larger means more diverse. One of them,
+``evolvability``, scores by offspring that it asks for.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from nichechain.walks.diversity.metrics import (
     parent_distance,
 )
 from nichechain.walks.diversity.novelty import ArchiveRule, NoveltyArchive
+from nichechain.walks.diversity.offspring import OffspringNiches
 
 __all__ = [
     "AncestorDistance",
@@ -28,6 +30,7 @@ __all__ = [
     "KernelDensity",
     "Metric",
     "NoveltyArchive",
+    "OffspringNiches",
     "ParentDistance",
     "Surroundings",
     "ancestor_distance",
@@ -43,6 +46,7 @@ _METRICS: dict[str, Callable[[], Metric]] = {
     "parent": ParentDistance,
     "ancestors": AncestorDistance,
     "kde": KernelDensity,
+    "evolvability": OffspringNiches,
 }
 
 
@@ -51,7 +55,7 @@ def make(name: str) -> Metric:
 
     Parameters
     ----------
-    name : {"knn", "knn-no-archive", "parent", "ancestors", "kde"}
+    name : {"knn", "knn-no-archive", "parent", "ancestors", "kde", "evolvability"}
 
     Raises
     ------

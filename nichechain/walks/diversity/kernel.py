@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal, get_args
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,9 +20,7 @@ from nichechain.core.arrays import (
 )
 from nichechain.core.checks import as_floats, check_choice, check_positive, check_share
 from nichechain.core.errors import NichechainError
-
-if TYPE_CHECKING:
-    from nichechain.walks.diversity.metrics import Surroundings
+from nichechain.walks.diversity.metrics import OfBehaviors, Surroundings
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -34,7 +32,7 @@ _RIDGE = 1e-6
 
 
 @dataclass(frozen=True)
-class KernelDensity:
+class KernelDensity(OfBehaviors):
     """Minus the density of others at a behavior, discounted by their age (Eq. 20).
 
     Parameters

@@ -49,6 +49,11 @@ class Surroundings:
         state itself.
     span : (B,) array
         Extent of behavior space along each axis.
+    litters : (R, Q, m) int64 array, optional
+        Where the own offspring of each of the scored landed, ``births.NONE`` where one failed; there if
+        the metric asks for a litter.
+    niches : int
+        States below it are niches.
     """
 
     siblings: Floats
@@ -56,6 +61,8 @@ class Surroundings:
     age: Ints
     path: Floats
     span: Floats
+    litters: Ints | None = None
+    niches: int = 0
 
 
 class Metric(Protocol):
@@ -64,6 +71,11 @@ class Metric(Protocol):
     @property
     def remembers(self) -> bool:
         """Whether it looks at the novelty archive."""
+        ...
+
+    @property
+    def litter(self) -> int:
+        """How many offspring of each of the scored it asks for, 0 for none."""
         ...
 
     def __call__(self, query: Floats, lineage: Ints, itself: Ints, around: Surroundings) -> Floats:
@@ -86,8 +98,17 @@ class Metric(Protocol):
         ...
 
 
+class OfBehaviors:
+    """A metric that behaviors are enough for."""
+
+    @property
+    def litter(self) -> int:
+        """It asks for no offspring."""
+        return 0
+
+
 @dataclass(frozen=True)
-class KNearest:
+class KNearest(OfBehaviors):
     """Sum of the distances to the k nearest in S ∪ X, as in novelty search (Eq. 17).
 
     Parameters
@@ -125,7 +146,7 @@ class KNearest:
 
 
 @dataclass(frozen=True)
-class ParentDistance:
+class ParentDistance(OfBehaviors):
     """Distance to the parent (Eq. 18); a state counts as its own unmutated child."""
 
     @property
@@ -139,7 +160,7 @@ class ParentDistance:
 
 
 @dataclass(frozen=True)
-class AncestorDistance:
+class AncestorDistance(OfBehaviors):
     """Sum of the distances to all ancestors from the start of the walk (Eq. 19).
 
     The sum runs over the states of the walk, so an ancestor that stayed for several steps counts
