@@ -52,7 +52,7 @@ class SelectionCommand(BuildCommand):
     elites: int = 20
     """How many elites of the end of each search are checked; 0 for none."""
     offspring: int = 20
-    """Fresh offspring of each of these."""
+    """Fresh offspring of each elite that is checked."""
     selection: tyro.conf.Suppress[str] = "uniform"
     objective: tyro.conf.Suppress[ObjectiveName] = "domain"
     objective_l: tyro.conf.Suppress[int] = 1
