@@ -16,6 +16,7 @@ from nichechain.births.lineages import lineages_of, no_lineages
 from nichechain.births.table import LINEAGE, NONE
 from nichechain.core.checks import as_floats, as_whole
 from nichechain.core.errors import NichechainError
+from nichechain.core.notebook import facts_table
 from nichechain.niches import Niches
 from nichechain.niches.plain import ATTRIBUTE, from_plain
 
@@ -254,6 +255,21 @@ class TransitionCounts:
             np.concatenate([self.families, later]),
             np.concatenate([self.lineages, lineages]),
         )
+
+    def __repr__(self) -> str:
+        shown = ", ".join(f"{name} {value}" for name, value in self._facts().items())
+        return f"TransitionCounts({shown}; {self.niches})"
+
+    def _repr_html_(self) -> str:
+        return facts_table("TransitionCounts", {**self._facts(), "niches": self.niches})
+
+    def _facts(self) -> dict[str, object]:
+        return {
+            "births with a parent": int(self.births.sum()),
+            "rows observed": f"{self.rows_observed} of {len(self.niches)}",
+            "births outside": self.births_outside,
+            "births of lineages": len(self.lineages),
+        }
 
     @property
     def births(self) -> Ints:

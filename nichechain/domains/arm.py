@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from nichechain.core.checks import check_at_least, check_seed, rng_of
 from nichechain.domains.base import Evaluation, check_genotypes
 from nichechain.domains.noise import Noise, check_seeds
+from nichechain.domains.shown import ShownDomain
 from nichechain.domains.watching import Motion
 
 if TYPE_CHECKING:
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 _MOMENTS, _RATE = 40, 20.0
 
 
-class PlanarArm:
+class PlanarArm(ShownDomain):
     """An arm of equal links that sum to 1, in closed form; behavior is where its hand is.
 
     Parameters

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from nichechain.core.errors import NichechainError
+from nichechain.domains.shown import ShownDomain
 
 if TYPE_CHECKING:
     from torch import nn
@@ -172,7 +173,7 @@ def check_genotypes(genotypes: ArrayLike, length: int) -> Float32s:
     return array
 
 
-class Wrapper:
+class Wrapper(ShownDomain):
     """Passes everything on to a domain.
 
     Parameters

@@ -15,6 +15,7 @@ from nichechain.domains.memory import CACHE_MEMORY, check_cache_memory
 from nichechain.domains.noise import Noise, check_seeds
 from nichechain.domains.policies.controllers import Controller
 from nichechain.domains.policies.networks import network
+from nichechain.domains.shown import ShownDomain
 from nichechain.domains.watching import Film, Motion, offscreen_backend
 
 if TYPE_CHECKING:
@@ -27,7 +28,7 @@ _OUTPUTS = 4
 _RATE = 25.0
 
 
-class FetchTask:
+class FetchTask(ShownDomain):
     """A Fetch task of gymnasium-robotics from one fixed start.
 
     A policy sees the observations (the goal is left out) and acts 50 times at 25 Hz. Final

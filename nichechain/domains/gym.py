@@ -18,6 +18,7 @@ from nichechain.domains.noise import Noise, average, check_repeats, check_seeds,
 from nichechain.domains.policies.controllers import MLP, Controller
 from nichechain.domains.policies.networks import network
 from nichechain.domains.policies.spaces import Actions, Observations, actions_of, stacked
+from nichechain.domains.shown import ShownDomain
 from nichechain.domains.watching import Film
 from nichechain.niches import parse_bounds
 from nichechain.niches.base import check_bounds, precision_of
@@ -34,7 +35,7 @@ _SILENCE = Noise()
 _ENV_OPTION = "env."
 
 
-class GymDomain:
+class GymDomain(ShownDomain):
     """A Gymnasium environment, a policy that acts in it, and a descriptor of what became of it.
 
     An evaluation makes one episode and reads its behavior off. The same genotype gives the same

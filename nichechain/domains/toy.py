@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from nichechain.core.checks import check_at_least, check_seed, rng_of
 from nichechain.domains.base import Evaluation, check_genotypes
 from nichechain.domains.noise import Noise, check_seeds
+from nichechain.domains.shown import ShownDomain
 
 if TYPE_CHECKING:
     from torch import nn
@@ -20,7 +21,7 @@ Floats = NDArray[np.float64]
 LOW, HIGH = -5.0, 5.0
 
 
-class ToyMap:
+class ToyMap(ShownDomain):
     """A map from the genome (g0, g1) in [-5, 5]² to a behavior in [-5, 5].
 
     A genome outside of the square is read as the nearest in it, so that any mutation operator may

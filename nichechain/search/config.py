@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Mapping
-from dataclasses import KW_ONLY, MISSING, asdict, dataclass, field, fields
+from dataclasses import KW_ONLY, MISSING, Field, asdict, dataclass, field, fields
 from typing import Any, Literal, cast, get_args
 
 from nichechain.core.checks import (
@@ -45,7 +45,7 @@ BROOD = 10
 """Lineages that begin at the same elite, unless told otherwise."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class SearchConfig:
     """What a MAP-Elites search does, whatever its niches are: options of ``nichechain build`` as they stand.
 
@@ -149,12 +149,24 @@ class SearchConfig:
     seed: int = 0
     domain_seed: int = 0
 
+    def __repr__(self) -> str:
+        # What is as always would hide what is not.
+        told = (f"{field.name}={getattr(self, field.name)!r}" for field in fields(self) if self._says(field))
+        return f"{type(self).__name__}({', '.join(told)})"
+
+    def _says(self, field: Field[Any]) -> bool:
+        """Whether a value is needed, or is not the usual one."""
+        if field.default is field.default_factory is MISSING:
+            return True
+        usual = field.default if field.default_factory is MISSING else field.default_factory()
+        return bool(getattr(self, field.name) != usual)
+
     def settings(self) -> dict[str, Any]:
         """These values by their names, without what a subclass adds."""
         return {field.name: getattr(self, field.name) for field in fields(SearchConfig)}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class BuildConfig(SearchConfig):
     """A MAP-Elites build ("Variation operator"; step 3 of the estimation of l-evolvability).
 
@@ -265,10 +277,9 @@ class BuildConfig(SearchConfig):
     def _repr_html_(self) -> str:
         from nichechain.core.notebook import facts_table
 
-        usual = {field.name: field.default for field in fields(self)}
-        # What is as always would hide what is not.
-        told = {name: value for name, value in self.to_json().items() if value != usual[name]}
-        return facts_table("BuildConfig", {name: value for name, value in told.items() if value != {}})
+        return facts_table(
+            "BuildConfig", {each.name: getattr(self, each.name) for each in fields(self) if self._says(each)}
+        )
 
     def to_json(self) -> dict[str, Any]:
         """Plain values for JSON; as before grids had an epsilon, where it is the usual one."""

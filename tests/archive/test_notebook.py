@@ -38,3 +38,14 @@ def test_elites_and_configurations_are_short(arm_archive):
     assert "evaluations" in shown
     assert "800" in shown
     assert "lineage_length" not in shown
+
+
+def test_the_text_of_a_configuration_makes_it_again():
+    options = {"joints": 5}
+    config = nc.BuildConfig(
+        "arm", (3, 4), ((-1, 1), (0, 1)), evaluations=40, step_bound=("rescaled", 2), domain_options=options
+    )
+    text = repr(config)
+    assert eval(text, {"BuildConfig": nc.BuildConfig}) == config  # our own text
+    assert "lineage" not in text
+    assert len(text) < 200

@@ -27,3 +27,11 @@ def test_what_a_notebook_shows_of_an_answer():
     assert "2-evolvability: 2.94 niches" in nc.l_evolvability(chain, niche=0, l=2, lineages=10)._repr_html_()
     assert "of 3 niches" in nc.niche_evolvability(chain, l=2, lineages=10)._repr_html_()
     assert "none" in chain._repr_html_()
+
+
+def test_counts_are_short():
+    counts = nc.load("fetch-pick-and-place").counts
+    for shown in (repr(counts), counts._repr_html_()):
+        assert str(42000 - 100 - 1800) in shown
+        assert f"{counts.rows_observed} of 400" in shown
+        assert len(shown) < 1000
