@@ -8,7 +8,7 @@ import pytest
 FOLDER = Path(__file__).resolve().parents[1] / "docs" / "notebooks"
 NOTEBOOKS = sorted(FOLDER.glob("*.ipynb"))
 # What a notebook needs beyond what nichechain does.
-NEEDS = {"03_lunar_lander": "Box2D"}
+NEEDS = {"03_lunar_lander": "Box2D", "06_qdax": "qdax"}
 
 notebooks = pytest.mark.parametrize("path", [pytest.param(path, id=path.stem) for path in NOTEBOOKS])
 
