@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -144,24 +145,23 @@ def _one(command: EvolvabilityCommand, archive: Archive, chain: NicheChain) -> p
     import pandas as pd
 
     from nichechain import execution
-    from nichechain.evolvability import genotype_evolvability, l_evolvability
+    from nichechain.evolvability import genotype_evolvability
+    from nichechain.evolvability.niches import answer
+    from nichechain.evolvability.question import Question, Root
     from nichechain.niches import parse_niche
 
     if command.niche is not None:
         niche = parse_niche(command.niche, "--niche")
         state = archive.niches.state(niche)
-        result = l_evolvability(
-            chain,
-            niche=niche,
-            **command.asked(),
-        )
+        with _drawing(command, chain) as tell:
+            result = answer(chain, Root(chain, niche=niche), Question(**command.asked()), tell)
     else:
         assert command.elite is not None
         elite = archive.elite(parse_niche(command.elite, "--elite"))
         state = elite.state
         with (
             execution.make(command.workers, command.cache_memory) as executor,
-            progress.spinner("following the elite's children"),
+            _drawing(command, chain) as tell,
         ):
             result = genotype_evolvability(
                 archive,
@@ -170,6 +170,7 @@ def _one(command: EvolvabilityCommand, archive: Archive, chain: NicheChain) -> p
                 record=not command.fresh_only,
                 chain=chain,
                 executor=executor,
+                on_done=tell,
                 **command.asked(),
             )
     values = {name: value for name, value in asdict(result).items() if value is not None}
@@ -177,12 +178,21 @@ def _one(command: EvolvabilityCommand, archive: Archive, chain: NicheChain) -> p
     return pd.DataFrame([{**root, "root": "niche" if command.niche is not None else "elite", **values}])
 
 
+def _drawing(
+    command: EvolvabilityCommand, chain: NicheChain
+) -> AbstractContextManager[Callable[[int], None]]:
+    """A bar of draws of T, for one root; a genotype has draws of its own where T has none."""
+    drawn = command.elite is not None or chain.posterior is not None
+    return progress.adding(command.draws if drawn else 1, "draws of T")
+
+
 def _best_elites(command: EvolvabilityCommand, archive: Archive, chain: NicheChain) -> pd.DataFrame:
     """The best elites, best first."""
     from nichechain.evolvability import elite_evolvability
 
     asked = {name: value for name, value in command.asked().items() if name not in ("method", "repeats")}
-    ranking = elite_evolvability(archive, chain=chain, **asked)
+    with progress.adding(command.draws, "draws of T") as tell:
+        ranking = elite_evolvability(archive, chain=chain, on_done=tell, **asked)
     ranking = ranking[ranking["births"] >= command.min_births]
     _check_enough(len(ranking), command)
     frame = ranking.head(command.top or 10).copy()
@@ -247,20 +257,24 @@ def _drift(command: EvolvabilityCommand, archive: Archive, chain: NicheChain) ->
 def _set_band(frame: pd.DataFrame, command: EvolvabilityCommand, archive: Archive) -> None:
     """Put the bounds of another band in place of the posterior's interval."""
     from nichechain.evolvability import bootstrap_elites, prior_sensitivity
+    from nichechain.evolvability.uncertainty import RESAMPLES
 
     if command.uncertainty == "prior":
-        band = prior_sensitivity(
-            archive.counts,
-            l=command.l,
-            lineages=command.lineages,
-            convention=command.convention,
-            draws=command.draws,
-            seed=command.seed,
-        )
+        with progress.adding(5, "priors") as tell:
+            band = prior_sensitivity(
+                archive.counts,
+                l=command.l,
+                lineages=command.lineages,
+                convention=command.convention,
+                draws=command.draws,
+                seed=command.seed,
+                on_done=tell,
+            )
     else:
-        with progress.spinner("resampling elites"):
+        with progress.adding(RESAMPLES, "resamples") as tell:
             band = bootstrap_elites(
                 archive.counts,
+                on_done=tell,
                 l=command.l,
                 lineages=command.lineages,
                 convention=command.convention,

@@ -43,21 +43,27 @@ def run(arguments: Sequence[str]) -> int:
     output.check_out(command.out, ())
     check_at_least(0, **{"--seed": command.seed})
     from nichechain.archive.archive import load
-    from nichechain.plots.explorer import write_explorer
+    from nichechain.plots.explorer import draws_of, write_explorer
 
     archive = parsing.seen(load(command.path), command.steps)
     other = None if command.beside is None else parsing.seen(load(command.beside), command.steps)
-    with progress.spinner("computing intervals over posterior draws"):
+    chain = archive.chain(command.estimator)
+    pairs = (
+        [(archive, chain)] if other is None else [(archive, chain), (other, other.chain(command.estimator))]
+    )
+    draws = sum(draws_of(each) if command.draws is None else command.draws for _, each in pairs)
+    with progress.adding(draws, "draws of T") as tell:
         write_explorer(
             archive,
-            archive.chain(command.estimator),
+            chain,
             command.out,
             l=command.l,
             lineages=command.lineages,
             draws=command.draws,
             seed=command.seed,
             films=command.films,
-            beside=None if other is None else (other, other.chain(command.estimator)),
+            beside=None if other is None else pairs[1],
+            on_done=tell,
         )
     size = command.out.stat().st_size
     output.console().print(f"wrote {command.out} ({size / 1e6:.1f} MB): open it in a browser")

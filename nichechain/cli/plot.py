@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
-from nichechain.cli import output, parsing
+from nichechain.cli import output, parsing, progress
 from nichechain.core.checks import check_at_least
 from nichechain.core.errors import NichechainError
 
@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from nichechain.archive.archive import Archive
+    from nichechain.chain import NicheChain
+    from nichechain.evolvability import NicheEvolvability
 
 _WITH_THRESHOLD = ("reachability", "classes", "transitions-by-class")
 
@@ -111,8 +113,6 @@ def run(arguments: Sequence[str]) -> int:
 
 
 def _draw_pair(command: PlotCommand, archive: Archive, left: Axes, right: Axes) -> None:
-    from nichechain.evolvability import niche_evolvability
-
     chain = archive.chain(command.estimator)
     if command.kind == "growth":
         from nichechain.plots.growth import check_growth
@@ -122,7 +122,7 @@ def _draw_pair(command: PlotCommand, archive: Archive, left: Axes, right: Axes) 
         from nichechain.plots import plot_evolvability
         from nichechain.plots.maps import plot_uncertainty
 
-        scores = niche_evolvability(chain, l=command.l, lineages=command.lineages)
+        scores = _scores(command, chain)
         plot_evolvability(archive, scores, left, min_births=command.min_births)
         plot_uncertainty(archive, scores, right)
         return
@@ -133,7 +133,7 @@ def _draw_pair(command: PlotCommand, archive: Archive, left: Axes, right: Axes) 
         niches = [chain.state(parse_niche(command.niche, "--niche"))]
     else:
         # A few draws tell the best from the last.
-        scores = niche_evolvability(chain, l=command.l, lineages=command.lineages, draws=_FEW_DRAWS)
+        scores = _scores(command, chain, draws=_FEW_DRAWS)
         ranking = scores.ranking(chain, min_births=command.min_births)["niche"]
         if ranking.empty:
             raise NichechainError(f"no niche has {command.min_births} births: choose one with --niche")
@@ -142,6 +142,16 @@ def _draw_pair(command: PlotCommand, archive: Archive, left: Axes, right: Axes) 
     plot_generations(chain, left, niches=niches, lineages=command.lineages)
     plot_lineages(chain, right, niches=niches, l=command.l)
     left.figure.suptitle(chain.estimator, fontsize="small", color="#555555")
+
+
+def _scores(command: PlotCommand, chain: NicheChain, draws: int | None = None) -> NicheEvolvability:
+    """l-evolvability of every niche, with a bar of the draws that it takes."""
+    from nichechain.evolvability.niches import answer_for_niches
+    from nichechain.evolvability.question import DRAWS, Question
+
+    question = Question(command.l, command.lineages, draws=draws or DRAWS)
+    with progress.counting(1 if chain.posterior is None else question.draws, "draws of T") as tell:
+        return answer_for_niches(chain, question, tell=tell)
 
 
 def _draw(command: PlotCommand, archive: Archive, ax: Axes) -> None:
@@ -153,10 +163,7 @@ def _draw(command: PlotCommand, archive: Archive, ax: Axes) -> None:
         case "visits":
             plots.plot_visits(archive, ax)
         case "evolvability":
-            from nichechain.evolvability import niche_evolvability
-
-            chain = archive.chain(command.estimator)
-            scores = niche_evolvability(chain, l=command.l, lineages=command.lineages)
+            scores = _scores(command, archive.chain(command.estimator))
             plots.plot_evolvability(archive, scores, ax, min_births=command.min_births)
         case "transitions":
             plots.plot_transitions(archive, archive.chain(command.estimator), ax)
@@ -164,6 +171,7 @@ def _draw(command: PlotCommand, archive: Archive, ax: Axes) -> None:
             threshold = 0.05 if command.threshold is None else command.threshold
             plots.plot_reachability(archive, archive.chain(command.estimator), ax, threshold=threshold)
         case "reach":
+            from nichechain.evolvability.question import DRAWS
             from nichechain.evolvability.reach import reach
             from nichechain.niches import parse_niche
             from nichechain.plots.maps import plot_reach
@@ -171,7 +179,8 @@ def _draw(command: PlotCommand, archive: Archive, ax: Axes) -> None:
             assert command.niche is not None
             chain = archive.chain(command.estimator)
             niche = chain.state(parse_niche(command.niche, "--niche"))
-            found = reach(chain, niche=niche, l=command.l, lineages=command.lineages)
+            with progress.adding(1 if chain.posterior is None else DRAWS, "draws of T") as tell:
+                found = reach(chain, niche=niche, l=command.l, lineages=command.lineages, on_done=tell)
             plot_reach(archive, found, ax, niche=niche)
         case "wormholes":
             from nichechain.chain.structure.wormholes import wormholes

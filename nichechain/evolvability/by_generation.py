@@ -5,7 +5,7 @@ One table of answers: what a slider over generations and lineages goes through.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numba
@@ -19,7 +19,7 @@ from nichechain.core.checks import check_at_least
 from nichechain.core.intervals import drawn_interval
 from nichechain.core.randomness import Purpose, keyed
 from nichechain.evolvability.averaging import spread_of, widened
-from nichechain.evolvability.question import MOST_EXACT, DrawnChain, Question, dense
+from nichechain.evolvability.question import MOST_EXACT, DrawnChain, Question, dense, told
 from nichechain.evolvability.urns import hit_probabilities
 
 Floats = NDArray[np.float64]
@@ -33,7 +33,13 @@ _DENSE = 0.3
 
 
 def evolvability_table(
-    chain: NicheChain, longest: int, lineages: Sequence[int], *, draws: int = 50, seed: int = 0
+    chain: NicheChain,
+    longest: int,
+    lineages: Sequence[int],
+    *,
+    draws: int = 50,
+    seed: int = 0,
+    on_done: Callable[[int], None] | None = None,
 ) -> Floats:
     """l-evolvability of every niche, with its interval, for 1 to ``longest`` generations.
 
@@ -46,6 +52,8 @@ def evolvability_table(
         Numbers U of lineages, each at least 1.
     draws, seed : int
         Posterior draws of T, where it is estimated.
+    on_done : callable, optional
+        Told how many more draws are done.
 
     Returns
     -------
@@ -63,8 +71,9 @@ def evolvability_table(
     check_at_least(1, lineages=min(sizes))
     question = Question(longest, max(sizes), draws=draws, seed=seed)
     if chain.posterior is not None and chain.states > MOST_EXACT:
-        return _simulated(chain, longest, sizes, question)
-    drawn = [_exact(some, longest, sizes, chain.n_niches) for some in question.samples(chain)]
+        return _simulated(chain, longest, sizes, question, on_done)
+    samples = question.samples(chain, on_done=on_done)
+    drawn = [_exact(some, longest, sizes, chain.n_niches) for some in samples]
     mean = np.mean(drawn, axis=0)
     return np.stack([mean, *widened(mean, *drawn_interval(drawn), spread_of(chain), chain.n_niches)])
 
@@ -135,7 +144,13 @@ def _add_reached(hit: Any, factors: Any, powers: Any, found: Any) -> None:
             found[k, root] += targets - number[powers[k]].sum()
 
 
-def _simulated(chain: NicheChain, longest: int, sizes: list[int], question: Question) -> Floats:
+def _simulated(
+    chain: NicheChain,
+    longest: int,
+    sizes: list[int],
+    question: Question,
+    on_done: Callable[[int], None] | None,
+) -> Floats:
     """The same by lineages that draw rows of T as they enter them."""
     assert chain.posterior is not None
     n, lineages = chain.n_niches, 2 * max(sizes)
@@ -144,7 +159,7 @@ def _simulated(chain: NicheChain, longest: int, sizes: list[int], question: Ques
     drawn = np.empty((question.draws, len(sizes), longest, n))
     noise = np.zeros((len(sizes), longest, n))
     at_once = max(1, _DESCENDANTS // (lineages * (longest + 1)))
-    for draw in range(question.draws):
+    for draw in told(range(question.draws), on_done):
         rng = keyed(question.seed, Purpose.WALKS, draw)
         urns = urns_of(chain.posterior, keyed(question.seed, Purpose.POSTERIOR, draw))
         for start in range(0, n, at_once):

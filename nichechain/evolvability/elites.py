@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -35,6 +36,7 @@ def elite_evolvability(
     convention: Convention = "definition",
     draws: int = DRAWS,
     seed: int = 0,
+    on_done: Callable[[int], None] | None = None,
 ) -> pd.DataFrame:
     """Rank all elites by l-evolvability without a single rollout: their recorded children begin the lineages.
 
@@ -47,6 +49,8 @@ def elite_evolvability(
         As in :func:`nichechain.genotype_evolvability`.
     chain : NicheChain, optional
         By default ``archive.chain()``.
+    on_done : callable, optional
+        Told how many more draws of T are done.
 
     Returns
     -------
@@ -82,7 +86,7 @@ def elite_evolvability(
     strength = own_strength(chain) if strength is None else strength
     children = recorded_children(archive, elites.uid)
     means, saturated = [], False
-    for number, drawn in enumerate(question.samples(chain, redraw=True)):
+    for number, drawn in enumerate(question.samples(chain, redraw=True, on_done=on_done)):
         rng = keyed(seed, Purpose.FIRST_GENERATION, number)
         known, shares = draw_known(children, rng, strength)
         first: LinearOperator = _FirstRows(shares, 1.0 - known, drawn.rows, elites.niche)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import TYPE_CHECKING, Literal, get_args
 
@@ -45,6 +45,7 @@ def genotype_evolvability(
     draws: int = DRAWS,
     seed: int = 0,
     executor: Executor | None = None,
+    on_done: Callable[[int], None] | None = None,
 ) -> Evolvability:
     """l-evolvability of a genotype: its own children say where lineages begin.
 
@@ -74,6 +75,8 @@ def genotype_evolvability(
         By default ``archive.chain()``.
     executor : Executor, optional
         Where to evaluate the offspring; by default here.
+    on_done : callable, optional
+        Told how many more draws of T are done.
 
     Returns
     -------
@@ -122,7 +125,7 @@ def genotype_evolvability(
 
     def samples() -> Iterator[Sample]:
         # Where T is given, D is not, if it has to be guessed.
-        for number, drawn in enumerate(question.samples(chain, redraw=guessed)):
+        for number, drawn in enumerate(question.samples(chain, redraw=guessed, on_done=on_done)):
             if guessed:
                 rng = keyed(seed, Purpose.FIRST_GENERATION, number)
                 yield drawn.onward, draw_children(counts, root.children(drawn), rng, strength)

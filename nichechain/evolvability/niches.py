@@ -89,13 +89,24 @@ def l_evolvability(
     return answer(chain, Root(chain, niche=niche, offspring=offspring), question)
 
 
-def answer(chain: NicheChain, root: Root, question: Question) -> Evolvability:
-    """What :func:`l_evolvability` answers to a question that has been checked."""
+def answer(
+    chain: NicheChain, root: Root, question: Question, on_done: Callable[[int], None] | None = None
+) -> Evolvability:
+    """What :func:`l_evolvability` answers to a question that has been checked.
+
+    Parameters
+    ----------
+    chain : NicheChain
+    root : Root
+    question : Question
+    on_done : callable, optional
+        Told how many more draws of T are done, in closed form.
+    """
     question.warn_if_long(chain)
     if question.by_urns(chain):
         return replace(_one_by_urns(chain, root, question), births=root.births)
     own = root.visited(question)
-    samples = ((drawn.onward, root.children(drawn)) for drawn in question.samples(chain))
+    samples = ((drawn.onward, root.children(drawn)) for drawn in question.samples(chain, on_done=on_done))
     result = one_root(chain, samples, question, question.repeats_of_each(chain), own)
     return replace(result, births=root.births)
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import Literal, TypeVar, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,6 +18,8 @@ from nichechain.core.checks import as_floats, check_at_least, check_choice, chec
 from nichechain.core.errors import NichechainError
 from nichechain.core.randomness import Purpose, keyed
 from nichechain.niches import Niche
+
+Item = TypeVar("Item")
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -191,8 +193,21 @@ class Question:
             else:
                 yield chain.posterior.draw(keyed(self.seed, Purpose.POSTERIOR, number))
 
-    def samples(self, chain: NicheChain, *, redraw: bool = False) -> Iterator[DrawnChain]:
+    def samples(
+        self,
+        chain: NicheChain,
+        *,
+        redraw: bool = False,
+        on_done: Callable[[int], None] | None = None,
+    ) -> Iterator[DrawnChain]:
         """The same, each with what lineages do by it.
+
+        Parameters
+        ----------
+        chain, redraw
+            As in :meth:`transitions`.
+        on_done : callable, optional
+            Told 1 whenever the work on a draw is over.
 
         Yields
         ------
@@ -208,6 +223,8 @@ class Question:
                 onward = law.onward(transition, keyed(self.seed, Purpose.LINEAGE_LAW, number))
                 concentration = chain.posterior.elite_concentration
                 yield DrawnChain(transition, onward, concentration, self.seed, number)
+            if on_done is not None:
+                on_done(1)
 
     def repeats_of_each(self, chain: NicheChain, *, redraw: bool = False) -> int:
         """Simulations on each of :meth:`transitions`, so that all have as many as asked for."""
@@ -215,6 +232,14 @@ class Question:
 
     def _samples(self, chain: NicheChain, redraw: bool) -> int:
         return self.draws if redraw or chain.posterior is not None else 1
+
+
+def told(items: Iterable[Item], on_done: Callable[[int], None] | None) -> Iterator[Item]:
+    """The items, telling 1 whenever the work on one of them is over."""
+    for item in items:
+        yield item
+        if on_done is not None:
+            on_done(1)
 
 
 class Root:

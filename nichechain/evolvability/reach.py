@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -87,6 +88,7 @@ def reach(
     convention: Convention = "definition",
     draws: int = DRAWS,
     seed: int = 0,
+    on_done: Callable[[int], None] | None = None,
 ) -> Reach:
     """Niches that descendants of a root reach, and how surely.
 
@@ -107,6 +109,8 @@ def reach(
         Posterior draws of T that all figures are averaged over, where it is estimated.
     seed : int
         Of the draws, the same ones as those of :func:`nichechain.l_evolvability`.
+    on_done : callable, optional
+        Told how many more draws are done.
 
     Returns
     -------
@@ -127,7 +131,7 @@ def reach(
     visits, descendants = [], []
     some: list[Floats] = []
     own = root.visited(question)
-    for drawn in question.samples(chain):
+    for drawn in question.samples(chain, on_done=on_done):
         visit, passes = visit_probability(drawn.onward, root.children(drawn), question.drawn_steps(own))
         if own is not None:
             visit[own], passes[own] = 1.0, passes[own] + 1.0

@@ -7,6 +7,7 @@ sample of their niche. A band over priors questions the first, a bootstrap over 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -25,10 +26,13 @@ from nichechain.core.errors import NichechainError
 from nichechain.core.intervals import drawn_interval
 from nichechain.core.randomness import Purpose, keyed
 from nichechain.evolvability.niches import answer_for_niches
-from nichechain.evolvability.question import DRAWS, Convention, Question
+from nichechain.evolvability.question import DRAWS, Convention, Question, told
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+
+RESAMPLES = 50
+"""Of a bootstrap over elites, unless told otherwise."""
 
 BandKind = Literal["prior sensitivity", "bootstrap over elites"]
 
@@ -64,6 +68,7 @@ def prior_sensitivity(
     draws: int = 20,
     seed: int = 0,
     factor: float = 4.0,
+    on_done: Callable[[int], None] | None = None,
 ) -> NicheBand:
     """How far l-evolvability moves if the empirical-Bayes prior had been another.
 
@@ -78,6 +83,8 @@ def prior_sensitivity(
         Of the draws, which have the same keys under every fit.
     factor : float
         The strength is divided and multiplied by this, greater than 1.
+    on_done : callable, optional
+        Told how many more of the five fits are done.
 
     Returns
     -------
@@ -114,19 +121,21 @@ def prior_sensitivity(
         "all destination": replace(given, base=_only(base, np.array([1.0 - rest, 0.0, rest]))),
         "all displacement": replace(given, base=_only(base, np.array([0.0, 1.0 - rest, rest]))),
     }
-    values = np.array([answer_for_niches(_chain(posterior), question).value for posterior in priors.values()])
+    fits = told((_chain(posterior) for posterior in priors.values()), on_done)
+    values = np.array([answer_for_niches(fit, question).value for fit in fits])
     return NicheBand("prior sensitivity", values[0], values.min(axis=0), values.max(axis=0), tuple(priors))
 
 
 def bootstrap_elites(
     counts: TransitionCounts,
     *,
-    resamples: int = 50,
+    resamples: int = RESAMPLES,
     l: int = 5,
     lineages: int = 100,
     convention: Convention = "definition",
     draws: int = 5,
     seed: int = 0,
+    on_done: Callable[[int], None] | None = None,
 ) -> NicheBand:
     """How far l-evolvability moves if each niche had had other elites.
 
@@ -142,6 +151,8 @@ def bootstrap_elites(
         Posterior draws of T for each resample.
     seed : int
         Of resamples and draws.
+    on_done : callable, optional
+        Told how many more resamples are done.
 
     Returns
     -------
@@ -183,9 +194,8 @@ def bootstrap_elites(
         others = counts_of_families(redrawn(families, elite, rng), counts)
         return answer_for_niches(_chain(refitted(fitted, others)), question).value
 
-    again = np.array(
-        [again_with(rng) for rng in (keyed(seed, Purpose.RESAMPLING, number) for number in range(resamples))]
-    )
+    numbers = told(range(resamples), on_done)
+    again = np.array([again_with(keyed(seed, Purpose.RESAMPLING, number)) for number in numbers])
     ends = drawn_interval(again)
     low, high = (value + end - np.median(again, axis=0) for end in ends)
     niches = len(counts.niches)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import base64
 import json
+from collections.abc import Callable
 from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -55,6 +56,7 @@ def write_explorer(
     seed: int = 0,
     films: Path | None = None,
     beside: tuple[Archive, NicheChain] | None = None,
+    on_done: Callable[[int], None] | None = None,
 ) -> None:
     """Write the page, one self-contained HTML file.
 
@@ -78,6 +80,8 @@ def write_explorer(
         ``14,14.gif``; PNG and MP4 as well. 2 MB in all.
     beside : (Archive, NicheChain), optional
         A second archive, shown beside the first.
+    on_done : callable, optional
+        Told how many more draws are done, of both archives together.
 
     Raises
     ------
@@ -85,7 +89,7 @@ def write_explorer(
         If a number is out of range, behavior does not have two axes, there are too many niches, or a
         film is of no niche.
     """
-    options: dict[str, Any] = {"l": l, "lineages": lineages, "draws": draws, "seed": seed}
+    options: dict[str, Any] = {"l": l, "lineages": lineages, "draws": draws, "seed": seed, "on_done": on_done}
     text = explorer_page(archive, chain, films=None if films is None else Path(films), **options)
     if beside is not None:
         if not (isinstance(beside, tuple) and len(beside) == 2):
@@ -105,10 +109,10 @@ def explorer_page(
     draws: int | None = None,
     seed: int = 0,
     films: Path | None = None,
+    on_done: Callable[[int], None] | None = None,
 ) -> str:
     """The page as text; see :func:`write_explorer`."""
-    few = _FEW_DRAWS if chain.posterior is not None and chain.states > MOST_EXACT else DRAWS
-    question = Question(l, lineages, draws=few if draws is None else draws, seed=seed)
+    question = Question(l, lineages, draws=draws_of(chain) if draws is None else draws, seed=seed)
     if l > LONGEST:
         raise NichechainError(f"l is {l}, but the page goes up to {LONGEST} generations")
     if lineages > _MOST_LINEAGES:
@@ -127,7 +131,7 @@ def explorer_page(
         **transition(chain),
         **observed(archive, chain),
         **past(archive),
-        **_scores(chain, question),
+        **_scores(chain, question, on_done),
         "films": {} if films is None else _films(archive, films),
     }
     program = "\n".join(map(_text, _PROGRAM))
@@ -207,11 +211,20 @@ def _elites(archive: Archive) -> dict[str, Any]:
     return {"elites": packed(found, np.float64), "replacement": archive.config.replacement}
 
 
-def _scores(chain: NicheChain, question: Question) -> dict[str, Any]:
+def draws_of(chain: NicheChain) -> int:
+    """Posterior draws behind a page, where nobody says how many; one where T is given."""
+    if chain.posterior is None:
+        return 1
+    return _FEW_DRAWS if chain.states > MOST_EXACT else DRAWS
+
+
+def _scores(chain: NicheChain, question: Question, on_done: Callable[[int], None] | None) -> dict[str, Any]:
     """Mean and 90 % interval over the draws at every stop of the sliders: (3, U, l, niches)."""
     simulated = chain.posterior is not None and chain.states > MOST_EXACT
     sizes = sorted({*(_LINEAGES_OF_MANY if simulated else _LINEAGES), question.lineages})
-    table = evolvability_table(chain, LONGEST, sizes, draws=question.draws, seed=question.seed)
+    table = evolvability_table(
+        chain, LONGEST, sizes, draws=question.draws, seed=question.seed, on_done=on_done
+    )
     scale, steps = in_steps(table)
     return {
         "l": question.l,
