@@ -31,6 +31,7 @@ studies:
   pressure DOMAIN     does stronger selection for diversity raise evolvability?
   metrics DOMAIN      does it matter which diversity metric is selected for?
   sensitivity DOMAIN  does it matter how a parameter is set that the paper leaves open?
+  population DOMAIN   does the metric matter for the population of a multi-state walk?
 
 and of a study that was begun:
   resume PATH         go on with it, perhaps to more runs
@@ -68,6 +69,8 @@ class _Walks(WalkSettings):
     cache_memory: parsing.CacheMemory = None
     _: KW_ONLY
     step_bound: Annotated[str | None, parsing.option("KIND:SIZE", "unbounded")] = None
+    states: Annotated[int | None, parsing.option("INT", "one")] = None
+    """States of a multi-state walk at a time, which measures are averaged over."""
 
     def base(self) -> Condition:
         """What all conditions share."""
@@ -134,6 +137,27 @@ class SensitivityCommand(_Walks):
 
 
 @dataclass(frozen=True)
+class PopulationCommand(_Walks):
+    """Multi-state walks, each kind selecting its population for another diversity metric."""
+
+    metrics: str = "kde,knn"
+    """Diversity metrics."""
+    steps: int = 50
+    """Steps T of a walk, of T + 1 populations."""
+    level: str = "selective"
+    """Pressure: selective, random, or the best share of states and offspring that may follow."""
+    _: KW_ONLY
+    states: int = 10
+    """States of a walk at a time, at least 2."""
+
+    def conditions(self) -> tuple[Condition, ...]:
+        """One for each metric."""
+        from nichechain.studies.study import metric_conditions
+
+        return metric_conditions(parsing.words(self.metrics), self.base())
+
+
+@dataclass(frozen=True)
 class ResumeCommand:
     """Go on with a study that was begun."""
 
@@ -153,6 +177,9 @@ class ReportCommand:
     """Folder of the study."""
 
 
+_Study = PressureCommand | MetricsCommand | SensitivityCommand | PopulationCommand
+
+
 def run(arguments: Sequence[str]) -> int:
     """Walk a study, then report on it."""
     if not arguments or arguments[0] in ("-h", "--help"):
@@ -169,12 +196,15 @@ def run(arguments: Sequence[str]) -> int:
         return _begin(parsing.parse(MetricsCommand, rest, name="walks metrics"), "metrics")
     if verb == "sensitivity":
         return _begin(parsing.parse(SensitivityCommand, rest, name="walks sensitivity"), "sensitivity")
+    if verb == "population":
+        return _begin(parsing.parse(PopulationCommand, rest, name="walks population"), "population")
     raise NichechainError(
-        f"there is no study {verb!r}: it must be one of pressure, metrics, sensitivity, resume or report"
+        f"there is no study {verb!r}: it must be one of pressure, metrics, sensitivity, population, resume "
+        "or report"
     )
 
 
-def _begin(command: PressureCommand | MetricsCommand | SensitivityCommand, kind: Kind) -> int:
+def _begin(command: _Study, kind: Kind) -> int:
     from nichechain import domains
 
     options = parsing.domain_options(command.options)
@@ -241,13 +271,16 @@ def _report(folder: Path) -> int:
 
 def _means(analysis: Analysis, unit: str) -> Table:
     """What a study ends with on which the paper has no numbers."""
-    made = output.table("condition", "runs", f"mean η* at step {analysis.last} ({unit})", "95 % interval")
+    from nichechain.studies.analysis import POPULATION
+
+    said = "ρ*" if analysis.main == POPULATION else "η*"
+    made = output.table("condition", "runs", f"mean {said} at step {analysis.last} ({unit})", "95 % interval")
     for summary in analysis.summaries:
-        if summary.measure == "expected_evolvability" and summary.step == analysis.last:
+        if summary.measure == analysis.main and summary.step == analysis.last:
             interval = f"{summary.low:.3g} to {summary.high:.3g}"
             made.add_row(summary.condition, str(summary.n), f"{summary.mean:.3g}", interval)
     for asked in analysis.asked:
-        if asked.test and asked.measure == "expected_evolvability" and asked.step == analysis.last:
+        if asked.test and asked.measure == analysis.main and asked.step == analysis.last:
             test = asked.test
             made.caption = f"{test.name}: {test.symbol} = {test.statistic:.3g}, p = {test.p:.2g}"
     return made
@@ -256,7 +289,7 @@ def _means(analysis: Analysis, unit: str) -> Table:
 def command_of(study: Study, folder: Path) -> str:
     """The command line that asks for a study."""
     from nichechain.studies.conditions import Condition
-    from nichechain.studies.study import LEVELS, METRICS, VARIATIONS
+    from nichechain.studies.study import LEVELS, METRICS, POPULATION_METRICS, POPULATION_SIZE, VARIATIONS
 
     base = study.conditions[0]
     labels = [condition.label for condition in study.conditions]
@@ -270,7 +303,9 @@ def command_of(study: Study, folder: Path) -> str:
         varied = base.label.partition(" ")[0]
         options["vary"] = next(name for name, change in VARIATIONS.items() if varied in change)
     flags = ["paired"] if study.paired else []
-    usual = Condition(label="usual")
+    if study.kind == "population" and labels != list(POPULATION_METRICS):
+        options["metrics"] = ",".join(labels)
+    usual = Condition(label="usual", states=POPULATION_SIZE if study.kind == "population" else None)
     for name in Condition.names()[1:]:
         value = getattr(base, name)
         if name != varied and value != getattr(usual, name):
@@ -292,7 +327,7 @@ def command_of(study: Study, folder: Path) -> str:
 
 
 def _study(
-    command: PressureCommand | MetricsCommand | SensitivityCommand,
+    command: _Study,
     kind: Kind,
     domain: Domain,
     options: Mapping[str, DomainOption],

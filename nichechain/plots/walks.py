@@ -23,8 +23,10 @@ DRAWN: Mapping[str, str] = {
     "expected_evolvability": "expected evolvability η*",
     "evolvability": "evolvability η",
     "coverage": "coverage d/n of the offspring",
+    "population_evolvability": "population evolvability ρ*",
 }
-"""Measures of a state that are drawn, and their labels."""
+"""Measures of a walk that are drawn, the mean over its states, and their labels."""
+_OF_STATES = ("expected_evolvability", "evolvability", "coverage")
 
 # Okabe and Ito's colours in an order of which neighbours differ in lightness as well.
 _COLORS = ("#000000", "#e69f00", "#0072b2", "#56b4e9", "#d55e00", "#cc79a7", "#009e73")
@@ -225,8 +227,9 @@ def draw_study(
     ordered: bool = False,
     unit: str = "",
     title: str = "",
+    main: str = "expected_evolvability",
 ) -> Figure:
-    """All of a study in one figure: η* over the steps, every run at one step, and the other measures.
+    """All of a study in one figure: a measure over the steps, every run at one step, and two others.
 
     Parameters
     ----------
@@ -235,6 +238,8 @@ def draw_study(
     step : int
         Step of the panel of runs.
     title : str
+    main : str
+        The measure; below it are two of η*, η and d/n.
 
     Returns
     -------
@@ -253,12 +258,12 @@ def draw_study(
         return _draw_starts(records, conditions=conditions, ordered=ordered, unit=unit, title=title)
     figure = Figure(figsize=(11.0, 8.6), layout="constrained")
     axes = figure.subplots(2, 2, gridspec_kw={"height_ratios": (1.25, 1.0)})
-    main = "expected_evolvability"
     plot_walks(records, axes[0, 0], measure=main, conditions=conditions, ordered=ordered, unit=unit)
     axes[0, 0].set_title("mean over runs and 95 % t-interval", fontsize="medium")
-    plot_runs(records, axes[0, 1], step=step, conditions=conditions, ordered=ordered, unit=unit)
+    plot_runs(records, axes[0, 1], step=step, measure=main, conditions=conditions, ordered=ordered, unit=unit)
     axes[0, 1].set_title(f"every run at step {step}, median and quartiles", fontsize="medium")
-    for ax, measure in zip(axes[1], ("evolvability", "coverage"), strict=True):
+    first = "evolvability" if main == "expected_evolvability" else "expected_evolvability"
+    for ax, measure in zip(axes[1], (first, "coverage"), strict=True):
         plot_walks(records, ax, measure=measure, conditions=conditions, ordered=ordered, unit=unit)
     figure.legend(
         *axes[0, 0].get_legend_handles_labels(),
@@ -279,7 +284,7 @@ def _draw_starts(
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(15.0, 4.6), layout="constrained")
-    for ax, measure in zip(figure.subplots(1, 3), DRAWN, strict=True):
+    for ax, measure in zip(figure.subplots(1, 3), _OF_STATES, strict=True):
         plot_runs(records, ax, step=0, measure=measure, conditions=conditions, ordered=ordered, unit=unit)
     figure.suptitle(f"{title}: every run at step 0, median and quartiles")
     return figure
@@ -302,9 +307,9 @@ def _labels(records: pd.DataFrame, measure: str, conditions: Sequence[str] | Non
 
 
 def _pivot(records: pd.DataFrame, label: str, measure: str) -> pd.DataFrame:
-    """One row per run, one column per step."""
+    """One row per run, one column per step; the mean over the states of a walk."""
     rows = records[records["condition"] == label]
-    return rows.pivot(index="run", columns="step", values=measure)
+    return rows.groupby(["run", "step"])[measure].mean().unstack()
 
 
 def _spread(values: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -30,7 +30,8 @@ if TYPE_CHECKING:
 MAIN = "expected_evolvability"
 """The measure that the paper calls evolvability in its results."""
 
-TESTED = (MAIN, "evolvability", "coverage")
+POPULATION = "population_evolvability"
+"""What a study of populations asks first."""
 
 Asking = Literal["trend", "groups", "change"]
 
@@ -122,7 +123,15 @@ class Analysis:
     @property
     def evaluations(self) -> int:
         """Rollouts of the finished runs, the starts among them."""
-        return self.offspring + sum(self.finished.values())
+        return sum(
+            n * self.study.condition(label).evaluations(self.study.steps)
+            for label, n in self.finished.items()
+        )
+
+    @property
+    def main(self) -> str:
+        """The measure that the study is about."""
+        return tested(self.study)[0]
 
     @property
     def last(self) -> int:
@@ -130,14 +139,15 @@ class Analysis:
         wanted = paper.METRICS_STEP if self.study.kind == "metrics" else paper.FIGURE_STEP
         return wanted if wanted in self.steps else self.steps[-1]
 
-    def summary(self, condition: str, step: int, measure: str = MAIN) -> Summary:
-        """The summary of a condition that has finished runs."""
-        wanted = (condition, measure, step)
+    def summary(self, condition: str, step: int, measure: str | None = None) -> Summary:
+        """The summary of a condition that has finished runs, by default of the main measure."""
+        wanted = (condition, measure or self.main, step)
         return next(s for s in self.summaries if (s.condition, s.measure, s.step) == wanted)
 
-    def answers(self, asking: Asking, step: int, measure: str = MAIN) -> list[Asked]:
-        """What was asked of a measure at a step."""
-        return [a for a in self.asked if (a.asking, a.step, a.measure) == (asking, step, measure)]
+    def answers(self, asking: Asking, step: int, measure: str | None = None) -> list[Asked]:
+        """What was asked of a measure at a step, by default of the main one."""
+        wanted = (asking, step, measure or self.main)
+        return [a for a in self.asked if (a.asking, a.step, a.measure) == wanted]
 
 
 def analyse(
@@ -162,24 +172,28 @@ def analyse(
     """
     frame = records.to_pandas(use_threads=False)
     tables = _Tables(study, frame)
+    main, *_ = measures = tested(study)
     last = int(frame["step"].max())
-    landmarks = {paper.FIGURE_STEP, paper.METRICS_STEP} if study.kind != "sensitivity" else set()
+    of_paper = study.kind in ("pressure", "metrics")
+    landmarks = {paper.FIGURE_STEP, paper.METRICS_STEP} if of_paper else set()
     steps = tuple(sorted({step for step in landmarks if step < last} | {last}))
     ask = _Asking(study, tables, resamples)
-    asked = [ask.groups(0, MAIN, tables.labels)]
+    asked = [ask.groups(0, main, tables.labels)]
     for step in steps:
         asked += [ask.change(label, step) for label in tables.labels if step > 0]
-        for measure in TESTED:
+        for measure in measures:
             if study.kind == "pressure" or varied(study) is not None:
                 asked.append(ask.trend(step, measure))
             if study.kind != "pressure" and step > 0:
                 asked.append(ask.groups(step, measure, tables.labels))
         four = [label for label in tables.labels if label in paper.METRICS]
         if study.kind == "metrics" and step > 0 and four != tables.labels:
-            asked.append(ask.groups(step, MAIN, four))
+            asked.append(ask.groups(step, main, four))
     runs = frame.groupby("condition")["run"].nunique()
     finished = {c.label: int(runs.get(c.label, 0)) for c in study.conditions}
-    offspring = sum(n * (study.steps + 1) * study.condition(label).offspring for label, n in finished.items())
+    each = {c.label: (study.steps + 1) * c.width * c.offspring for c in study.conditions}
+    offspring = sum(n * each[label] for label, n in finished.items())
+    alone = all(condition.states is None for condition in study.conditions)
     return Analysis(
         study=study,
         finished=finished,
@@ -190,9 +204,15 @@ def analyse(
         summaries=tuple(tables.summaries(sorted({0, *steps}))),
         asked=tuple(asked),
         dissimila=study_dissimila(frame, tables.labels, horizon=horizon, seed=study.seed, resamples=resamples)
-        if last > horizon
+        if last > horizon and alone
         else None,
     )
+
+
+def tested(study: Study) -> tuple[str, ...]:
+    """Measures that are summarised and tested, that which a study is about first."""
+    of_states = (MAIN, "evolvability", "coverage")
+    return (POPULATION, *of_states) if study.kind == "population" else of_states
 
 
 def varied(study: Study) -> str | None:
@@ -219,7 +239,7 @@ def plain(value: Any) -> Any:
 
 
 class _Tables:
-    """A table of runs by steps for each condition and measure."""
+    """A table of runs by steps for each condition and measure, the mean over the states of a walk."""
 
     def __init__(self, study: Study, frame: pd.DataFrame) -> None:
         if frame.empty:
@@ -231,10 +251,10 @@ class _Tables:
         there = set(frame["condition"])
         self.labels = [label for label in known if label in there]
         self._of = {
-            (label, measure): rows.pivot(index="run", columns="step", values=measure)
+            (label, measure): rows.groupby(["run", "step"])[measure].mean().unstack()
             for label in self.labels
             for rows in [frame[frame["condition"] == label]]
-            for measure in TESTED
+            for measure in tested(study)
         }
 
     def at(self, label: str, measure: str, step: int) -> pd.Series:
@@ -273,10 +293,11 @@ class _Asking:
         )
 
     def change(self, label: str, step: int) -> Asked:
-        before, after = (self.tables.at(label, MAIN, s) for s in (0, step))
+        main = tested(self.study)[0]
+        before, after = (self.tables.at(label, main, s) for s in (0, step))
         runs = before.index.intersection(after.index)
         return _answer(
-            Asked("change", MAIN, step, (label,), None), lambda: change_test(before[runs], after[runs])
+            Asked("change", main, step, (label,), None), lambda: change_test(before[runs], after[runs])
         )
 
     def groups(self, step: int, measure: str, labels: Sequence[str]) -> Asked:

@@ -38,7 +38,7 @@ class Condition(WalkSettings):
     level : str
         Evolutionary pressure: ``selective``, ``better`` (than the parent), a fraction such as
         ``0.25`` (the best quarter), or ``random``.
-    metric : {"knn", "knn-no-archive", "parent", "ancestors", "kde"}
+    metric : {"knn", "knn-no-archive", "parent", "ancestors", "kde", "evolvability"}
         Diversity G.
     offspring, mutation, ...
         As in :class:`WalkSettings`, by name.
@@ -78,10 +78,22 @@ class Condition(WalkSettings):
             selection=selection_of(self.level),
             metric=self._metric(),
             offspring=self.offspring,
+            states=self.states,
             other_niche=self.other_niche,
             archive=ArchiveRule(limit=self.archive_limit, scope=self.archive_scope),
             seed=condition_seed(seed, self.label),
         )
+
+    @property
+    def width(self) -> int:
+        """States of a walk at a time."""
+        return self.states or 1
+
+    def evaluations(self, steps: int) -> int:
+        """Rollouts of a walk of so many steps, its start among them, if no candidate fails."""
+        children = self.width * self.offspring
+        judging = (self.width + children) * self.litter if self.metric == "evolvability" else 0
+        return self.width + (steps + 1) * (children + judging)
 
     def mutate(self) -> Mutation:
         """The mutation operator."""
@@ -95,6 +107,8 @@ class Condition(WalkSettings):
             return diversity.KNearest(self.k, archive=self.metric == "knn")
         if self.metric == "kde":
             return diversity.KernelDensity(self.bandwidth, self.mode, self.decay)
+        if self.metric == "evolvability":
+            return diversity.OffspringNiches(self.litter)
         return diversity.make(self.metric)
 
 

@@ -135,6 +135,7 @@ def _figure(analysis: Analysis, records: pa.Table, unit: str) -> Figure:
         step=analysis.last,
         conditions=[label for label, n in analysis.finished.items() if n],
         ordered=study.kind == "pressure" or varied(study) is not None,
+        main=analysis.main,
         unit=unit,
         title=title(analysis),
     )

@@ -73,7 +73,7 @@ class Block:
 
     def evaluations(self, steps: int) -> int:
         """Rollouts, the starts among them."""
-        return len(self.runs) * (1 + (steps + 1) * self.condition.offspring)
+        return len(self.runs) * self.condition.evaluations(steps)
 
 
 @dataclass(frozen=True)
@@ -293,13 +293,23 @@ def _walk(
 
 
 def start_genotypes(study: Study, condition: Condition, domain: Domain, runs: range) -> NDArray[np.float32]:
-    """First genotypes of a condition's runs (R, P), the same for all conditions of a paired study."""
+    """First genotypes of a condition's runs, the same for all conditions of a paired study.
+
+    Returns
+    -------
+    (R, P) float32 array, or (R, μ, P) for multi-state walks
+    """
     seed = study.seed if study.paired else condition.walk_config(study.seed).seed
     rows = [
-        initialise(domain, condition.initialisation, 1, seed=keyed(run_seed(seed, number), Purpose.INITIAL))
+        initialise(
+            domain,
+            condition.initialisation,
+            condition.width,
+            seed=keyed(run_seed(seed, number), Purpose.INITIAL),
+        )
         for number in runs
     ]
-    return np.concatenate(rows)
+    return np.concatenate(rows) if condition.states is None else np.stack(rows)
 
 
 def _tell(on_progress: Callable[[int], None] | None, made: int) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import KW_ONLY, dataclass
 from typing import Literal
 
-MetricName = Literal["knn", "knn-no-archive", "parent", "ancestors", "kde"]
+MetricName = Literal["knn", "knn-no-archive", "parent", "ancestors", "kde", "evolvability"]
 Mode = Literal["factor", "length"]
 
 
@@ -37,6 +37,10 @@ class WalkSettings:
         Behaviors that a novelty archive holds at most.
     archive_scope : {"walk", "configuration"}
         Whether each walk has a novelty archive of its own, or all of a kind share one.
+    states : int, optional
+        States of a multi-state walk at a time, whose population is measured too; by default a walk has one.
+    litter : int
+        Offspring of its own by which the metric evolvability scores each candidate.
     other_niche : bool
         Only a child in another niche than its parent may follow.
     initialisation : str
@@ -54,5 +58,7 @@ class WalkSettings:
     archive_limit: int = 1200
     archive_scope: Literal["walk", "configuration"] = "walk"
     step_bound: str | None = None
+    states: int | None = None
+    litter: int = 10
     other_niche: bool = False
     initialisation: str = "domain"

@@ -13,9 +13,10 @@ from nichechain.domains.base import Domain
 from nichechain.niches import GridNiches
 from nichechain.studies.conditions import Condition, pressure_of
 
-Kind = Literal["pressure", "metrics", "sensitivity"]
+Kind = Literal["pressure", "metrics", "sensitivity", "population"]
 
 LEVELS = ("selective", "0.1", "0.25", "0.5", "0.75", "random")
+POPULATION_METRICS, POPULATION_SIZE = ("kde", "knn"), 10
 METRICS = ("kde", "knn", "knn-no-archive", "ancestors", "parent")
 
 VARIATIONS: dict[str, dict[str, Sequence[Any]]] = {
@@ -46,7 +47,7 @@ class Study:
 
     Parameters
     ----------
-    kind : {"pressure", "metrics", "sensitivity"}
+    kind : {"pressure", "metrics", "sensitivity", "population"}
         What is compared, which decides the statistics.
     domain : str
         Name of the domain.
@@ -100,13 +101,19 @@ class Study:
         if self.kind == "pressure":
             for condition in self.conditions:
                 pressure_of(condition.level)
+        if self.kind == "population":
+            for condition in self.conditions:
+                if condition.width < 2:
+                    raise NichechainError(
+                        f"states of {condition.label!r} is {condition.states}, but must be at least 2"
+                    )
         GridNiches(self.shape, self.bounds)
         object.__setattr__(self, "domain_options", plain_options(self.domain_options))
 
     @property
     def evaluations(self) -> int:
         """Rollouts in all, the starts among them."""
-        return sum(self.runs * (1 + (self.steps + 1) * c.offspring) for c in self.conditions)
+        return sum(self.runs * c.evaluations(self.steps) for c in self.conditions)
 
     def make_domain(self) -> Domain:
         """The domain that is walked on.

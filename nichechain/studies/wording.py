@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from nichechain.core.intervals import LEVEL
 from nichechain.landscape import QUANTILES
 from nichechain.studies import findings, paper
-from nichechain.studies.analysis import MAIN, Analysis, Asked, Summary, varied
+from nichechain.studies.analysis import MAIN, POPULATION, Analysis, Asked, Summary, tested, varied
 from nichechain.studies.conditions import Condition
 from nichechain.studies.dissimila import OUTCOMES, Relation
 from nichechain.studies.document import (
@@ -28,8 +28,9 @@ _TITLES = {
     "pressure": "Evolutionary pressure and evolvability",
     "metrics": "Diversity metrics and evolvability",
     "sensitivity": "Evolvability when one setting varies",
+    "population": "Diversity metrics and the evolvability of a population",
 }
-_MEASURES = {MAIN: "η*", "evolvability": "η", "coverage": "d/n"}
+_MEASURES = {POPULATION: "ρ*", MAIN: "η*", "evolvability": "η", "coverage": "d/n"}
 
 
 def title(analysis: Analysis) -> str:
@@ -145,6 +146,12 @@ def _reservations(analysis: Analysis) -> Iterator[str]:
 def _caption(analysis: Analysis) -> str:
     if not analysis.last:
         return "η*, η and d/n of every run at step 0, with medians and quartiles."
+    if analysis.main == POPULATION:
+        return (
+            "Mean over runs of population evolvability ρ*, the mean distance between two of the states that "
+            f"follow, and of η* and d/n of a state, with {_LEVEL} t-intervals, and ρ* of every run at step "
+            f"{analysis.last}."
+        )
     return (
         f"Mean over runs of expected evolvability η*, evolvability η and coverage d/n at each step, with "
         f"{_LEVEL} t-intervals, and η* of every run at step {analysis.last}."
@@ -162,7 +169,7 @@ def _means(analysis: Analysis, unit: str) -> Iterator[Block]:
         for step in later:
             (asked,) = (a for a in analysis.answers("change", step) if a.conditions == (label,))
             cells.append(asked.reason if asked.test is None else with_interval(asked.test.effect))
-        others = [_mean(analysis.summary(label, analysis.last, m)) for m in ("evolvability", "coverage")]
+        others = [_mean(analysis.summary(label, analysis.last, m)) for m in tested(analysis.study)[1:]]
         rows.append((label, str(analysis.finished[label]), *cells, *others))
     yield Heading("Evolvability")
     inside = f", in {unit}; d/n has no unit" if unit else ""
@@ -171,10 +178,9 @@ def _means(analysis: Analysis, unit: str) -> Iterator[Block]:
         (
             "Condition",
             "Runs",
-            *(f"η* at {step}" for step in steps),
+            *(f"{_MEASURES[analysis.main]} at {step}" for step in steps),
             *(f"Change 0 to {step}" for step in later),
-            f"η at {analysis.last}",
-            f"d/n at {analysis.last}",
+            *(f"{_MEASURES[m]} at {analysis.last}" for m in tested(analysis.study)[1:]),
         ),
         tuple(rows),
     )
@@ -198,13 +204,13 @@ def _tests(analysis: Analysis) -> Iterator[Block]:
     )
     for a in asked:
         # The pairs of the paper's metrics alone stand beside the paper's.
-        apart = a.measure == MAIN and a.step > 0 and len(a.conditions) == conditions
+        apart = a.measure == analysis.main and a.step > 0 and len(a.conditions) == conditions
         if a.groups is None or not apart:
             continue
         names = ", ".join(f"{label} {rank:.2f}" for label, rank in a.groups.mean_ranks.items())
         yield Table(
-            f"Pairs at step {a.step}, η*: {a.groups.post_hoc}; each interval is of its pair alone. "
-            f"Mean ranks, 1 for the smallest: {names}.",
+            f"Pairs at step {a.step}, {_MEASURES[a.measure]}: {a.groups.post_hoc}; each interval is of its "
+            f"pair alone. Mean ranks, 1 for the smallest: {names}.",
             ("Pair", "p", a.groups.pairs[0].effect.name),
             tuple(
                 (f"{pair.first} against {pair.second}", number(pair.p), with_interval(pair.effect))

@@ -10,7 +10,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from nichechain.cli import main
-from nichechain.cli.walks import MetricsCommand, PressureCommand, SensitivityCommand
+from nichechain.cli.walks import MetricsCommand, PopulationCommand, PressureCommand, SensitivityCommand
 from nichechain.studies import (
     LEVELS,
     METRICS,
@@ -23,6 +23,7 @@ from nichechain.studies import (
     variations,
 )
 from nichechain.studies.report import FILES
+from nichechain.studies.study import POPULATION_METRICS, POPULATION_SIZE
 
 SMALL = ("--runs", "3", "--steps", "4", "--offspring", "6", "--workers", "1")
 
@@ -68,6 +69,26 @@ def test_the_command_in_a_report_gives_the_same_study(tmp_path, capsys):
     assert read_records(tmp_path / "second").equals(read_records(folder))
 
 
+@pytest.mark.parametrize(
+    "given",
+    [
+        ["population", "arm", *SMALL, "--metrics", "knn,ancestors", "--states", "3"],
+        ["metrics", "arm", *SMALL, "--metrics", "knn,evolvability", "--litter", "2", "--states", "2"],
+    ],
+)
+def test_so_does_that_of_several_states_and_of_litters(tmp_path, given, capsys):
+    folder = tmp_path / "first"
+    assert walks(*given, "--out", folder) == 0
+    report = (folder / "report.md").read_text()
+    command = next(line for line in report.splitlines() if line.startswith("nichechain walks"))
+    words = shlex.split(command.replace(str(folder), str(tmp_path / "second")))
+    capsys.readouterr()
+    assert main(words[1:]) == 0
+    assert read_study(tmp_path / "second") == read_study(folder)
+    assert read_records(tmp_path / "second").equals(read_records(folder))
+    assert ("ρ\\* at 4" in report) == (given[0] == "population")
+
+
 @pytest.mark.parametrize("vary", ["scale", "bandwidth-mode", "decay", "k", "offspring"])
 def test_sensitivity(tmp_path, vary, capsys):
     small = [word for word in SMALL if vary != "offspring" or word not in ("--offspring", "6")]
@@ -80,11 +101,11 @@ def test_sensitivity(tmp_path, vary, capsys):
         assert condition.label in shown
 
 
-@pytest.mark.parametrize("kind", ["pressure", "metrics", "sensitivity"])
+@pytest.mark.parametrize("kind", ["pressure", "metrics", "sensitivity", "population"])
 def test_starts_alone(kind, tmp_path):
     assert walks(kind, "arm", "--runs", "3", "--steps", "0", "--workers", "1", "--out", tmp_path) == 0
     report = (tmp_path / "report.md").read_text()
-    assert "η\\* at 0" in report
+    assert ("ρ\\* at 0" if kind == "population" else "η\\* at 0") in report
     assert "Change 0 to 0" not in report
 
 
@@ -127,6 +148,8 @@ def test_defaults_are_those_of_the_studies():
     out = Path("study")
     assert PressureCommand("arm", out).conditions() == pressure_conditions(LEVELS, Condition("base"))
     assert MetricsCommand("arm", out).conditions() == metric_conditions(METRICS, Condition("base"))
+    base = Condition("base", states=POPULATION_SIZE)
+    assert PopulationCommand("arm", out).conditions() == metric_conditions(POPULATION_METRICS, base)
     for name in VARIATIONS:
         assert SensitivityCommand("arm", out, vary=name).conditions() == variations(name, Condition("base"))
 
@@ -157,6 +180,9 @@ def test_help(capsys):
         (["metrics", "arm", "--decay", "0"], "decay is 0.0"),
         (["pressure", "arm", "--offspring", "0"], "offspring is 0"),
         (["pressure", "arm", "--runs", "0"], "runs is 0"),
+        (["pressure", "arm", "--states", "0"], "states is 0"),
+        (["population", "arm", "--states", "1"], "states of 'kde' is 1, but must be at least 2"),
+        (["pressure", "arm", "--metric", "evolvability", "--litter", "0"], "offspring is 0"),
         (["pressure", "arm", "--steps", "-1"], "steps is -1"),
         (["pressure", "arm", "--seed", "-1"], "seed is -1"),
         (["pressure", "arm", "--domain-seed", "-1"], "seed is -1"),
@@ -176,7 +202,7 @@ def test_help(capsys):
 )
 def test_bad_input(tmp_path, monkeypatch, capsys, words, message):
     monkeypatch.chdir(tmp_path)
-    if words[0] in ("pressure", "metrics"):
+    if words[0] in ("pressure", "metrics", "population"):
         words = [*words, "--out", "study"]
     assert walks(*words) == 2
     shown = capsys.readouterr()

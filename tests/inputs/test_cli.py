@@ -448,6 +448,24 @@ TABLE: tuple[tuple[str, str, tuple[str, ...], Bad], ...] = (
         {**_KDE, "scale": _POSITIVE},
     ),
     (
+        "walks pressure",
+        "PressureCommand",
+        ("arm", "--out", "{fresh}", "--runs", "2", "--steps", "1", "--metric", "evolvability"),
+        {"litter": _COUNT},
+    ),
+    (
+        "walks population",
+        "PopulationCommand",
+        ("arm", "--out", "{fresh}", "--runs", "2", "--steps", "1", "--offspring", "2", "--states", "2"),
+        {
+            **_WALKS,
+            **_KDE,
+            "states": ("1", *_COUNT),
+            "metrics": ("no-such-thing", "knn,no-such-thing", "knn,knn", ""),
+            "level": _LEVEL,
+        },
+    ),
+    (
         "walks resume",
         "ResumeCommand",
         ("{study}",),
@@ -535,6 +553,7 @@ _POSITIONAL = {
     "walks pressure": ("domain",),
     "walks metrics": ("domain",),
     "walks sensitivity": ("domain",),
+    "walks population": ("domain",),
 }
 
 

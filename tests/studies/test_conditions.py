@@ -5,7 +5,13 @@ import pytest
 from nichechain.core.errors import NichechainError
 from nichechain.studies import Condition, condition_seed, pressure_of, selection_of
 from nichechain.walks import BetterThanParent, Selective, TopFraction, Uniform
-from nichechain.walks.diversity import AncestorDistance, KernelDensity, KNearest, ParentDistance
+from nichechain.walks.diversity import (
+    AncestorDistance,
+    KernelDensity,
+    KNearest,
+    OffspringNiches,
+    ParentDistance,
+)
 
 
 def test_defaults_are_the_papers() -> None:
@@ -24,10 +30,11 @@ def test_defaults_are_the_papers() -> None:
         ("parent", ParentDistance()),
         ("ancestors", AncestorDistance()),
         ("kde", KernelDensity(0.2, "length", 0.9)),
+        ("evolvability", OffspringNiches(4)),
     ],
 )
 def test_a_metric_takes_the_parameters_that_are_its_own(metric: Any, expected: object) -> None:
-    condition = Condition("x", metric=metric, k=7, bandwidth=0.2, mode="length", decay=0.9)
+    condition = Condition("x", metric=metric, k=7, bandwidth=0.2, mode="length", decay=0.9, litter=4)
     assert condition.walk_config(0).metric == expected
 
 
@@ -65,6 +72,8 @@ def test_seed_of_a_condition_depends_on_its_label_and_the_study_alone() -> None:
         ({"metric": "kde", "bandwidth": 0.0}, "bandwidth is 0.0"),
         ({"metric": "kde", "decay": 1.5}, "decay is 1.5"),
         ({"offspring": 0}, "offspring is 0"),
+        ({"states": 0}, "states is 0"),
+        ({"metric": "evolvability", "litter": 0}, "offspring is 0"),
         ({"mutation": "jump"}, "mutation is 'jump'"),
         ({"scale": -1.0}, "scale is -1.0"),
         ({"archive_limit": 0}, "archive_limit is 0"),
