@@ -8,7 +8,7 @@ from contextlib import AbstractContextManager
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from nichechain.cli import output, parsing, progress
+from nichechain.cli import meta, output, parsing, progress
 from nichechain.core.checks import check_at_least
 from nichechain.core.errors import NichechainError
 
@@ -54,6 +54,9 @@ class EvolvabilityCommand:
     """For --elite: so many offspring more, evaluated now."""
     fresh_only: bool = False
     """For --elite: only offspring evaluated now count, not those that are recorded."""
+    meta: Annotated[int | None, parsing.option("INT", "none")] = None
+    """For --elite: meta-evolvability, the mean 1-evolvability of so many of its children, measured by
+    --offspring (by default 10) offspring of each."""
     min_births: int = 20
     """Niches with fewer births behind their row of T are not ranked."""
     draws: int = 50
@@ -85,6 +88,8 @@ def run(arguments: Sequence[str]) -> int:
     from nichechain.evolvability.question import Question
 
     Question(command.l, command.lineages)
+    if command.meta is not None:
+        return meta.show(command, load(command.path))
     archive = parsing.seen(load(command.path), command.steps)
     chain = archive.chain(command.estimator, unvisited=command.unvisited)
     if command.niche is not None or command.elite is not None:
@@ -136,6 +141,8 @@ def _check_elite(command: EvolvabilityCommand) -> None:
     for name, given in {"--offspring": command.offspring, "--fresh-only": command.fresh_only}.items():
         if given and command.elite is None:
             raise NichechainError(f"{name} belongs to --elite, which is not given")
+    if command.meta is not None:
+        meta.check(command)
     if command.fresh_only and not command.offspring:
         raise NichechainError("--fresh-only needs offspring: give --offspring at least 1")
 

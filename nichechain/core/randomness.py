@@ -59,6 +59,8 @@ class Purpose(IntEnum):
     """Lineages simulated to see how far those of one elite overlap."""
     ELITE_ROW = 41
     """What one elite's children are drawn from; index: the draw of T and the state."""
+    GRANDCHILD = 42
+    """A child's child, made to measure meta-evolvability; index: its number."""
     TESSELLATION = 30
     """Uniform samples that a Voronoi tessellation is made of."""
 

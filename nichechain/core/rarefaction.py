@@ -39,6 +39,22 @@ def distinct_among(counts: Ints, total: int, size: int) -> float:
     return float(others.size - np.exp(log_missed).sum())
 
 
+def niches_among(states: Ints, niches: int, size: int) -> float:
+    """Expected number of distinct niches among some of those that landed in states.
+
+    Parameters
+    ----------
+    states : (m,) int64 array
+        What is negative landed nowhere.
+    niches : int
+        States from 0 to below it are niches.
+    size : int
+        How many are drawn, between 1 and m.
+    """
+    counts = np.unique(states[(states >= 0) & (states < niches)], return_counts=True)[1].astype(np.int64)
+    return distinct_among(counts, states.size, size)
+
+
 def mean_product(values: Floats, size: int) -> Floats:
     """Mean over all subsets of so many rows of the product of their values.
 

@@ -9,6 +9,7 @@ the paper demands. Under ``procedure`` the root's state counts, as its steps say
 from nichechain.evolvability.coverage import expected_coverage, rarefied_coverage, sampled_coverage
 from nichechain.evolvability.elites import elite_evolvability
 from nichechain.evolvability.genotypes import FirstGeneration, genotype_evolvability
+from nichechain.evolvability.meta import MetaEvolvability, meta_evolvability
 from nichechain.evolvability.niches import l_evolvability, niche_evolvability
 from nichechain.evolvability.question import DRAWS, Convention, Method, Question
 from nichechain.evolvability.reach import Reach, reach, visit_probability
@@ -22,6 +23,7 @@ __all__ = [
     "Convention",
     "Evolvability",
     "FirstGeneration",
+    "MetaEvolvability",
     "Method",
     "NicheBand",
     "NicheEvolvability",
@@ -34,6 +36,7 @@ __all__ = [
     "expected_coverage",
     "genotype_evolvability",
     "l_evolvability",
+    "meta_evolvability",
     "niche_evolvability",
     "prior_sensitivity",
     "rarefied_coverage",

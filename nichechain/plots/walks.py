@@ -252,6 +252,7 @@ def draw_study(
     """
     from matplotlib.figure import Figure
 
+    check_choice("main", main, DRAWN)
     if step not in set(records["step"]):
         raise NichechainError(f"step is {step}, but the walks have steps 0 to {records['step'].max()}")
     if not records["step"].any():

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nichechain.births.table import NONE
-from nichechain.core.rarefaction import distinct_among, mean_product
+from nichechain.core.rarefaction import mean_product, niches_among
 from nichechain.niches import Niches
 from nichechain.search.selection import Told
 from nichechain.steering.evolvable import spread
@@ -48,9 +48,7 @@ class OffspringCoverage:
 
     def __call__(self, children: Ints) -> float:
         """By the states of children (k,); one that failed lands in no niche."""
-        landed = children[(children != NONE) & (children < self._niches)]
-        counts = np.unique(landed, return_counts=True)[1].astype(np.int64)
-        return round(distinct_among(counts, children.size, self._lineages), _DIGITS)
+        return round(niches_among(children, self._niches, self._lineages), _DIGITS)
 
 
 class OffspringLineages:

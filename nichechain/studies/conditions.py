@@ -8,7 +8,7 @@ from dataclasses import dataclass, fields
 from typing import get_args
 
 from nichechain import variation
-from nichechain.core.checks import check_choice
+from nichechain.core.checks import check_at_least, check_choice
 from nichechain.core.errors import NichechainError
 from nichechain.core.randomness import Purpose, keyed
 from nichechain.studies.initialisation import check_scheme
@@ -63,6 +63,7 @@ class Condition(WalkSettings):
         check_choice("mode", self.mode, get_args(Mode))
         if not self.slug:
             raise NichechainError(f"label is {self.label!r}, but must have a letter or a digit")
+        check_at_least(1, litter=self.litter)
         check_scheme(self.initialisation)
         self.walk_config(0)
         self.mutate()

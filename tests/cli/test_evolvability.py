@@ -6,6 +6,7 @@ import pandas as pd
 import pytest
 
 import nichechain as nc
+from nichechain import evolvability
 from nichechain.cli import main
 
 
@@ -63,6 +64,20 @@ def test_an_elite_begins_with_its_record_and_fresh_offspring_if_asked(built, cap
     assert "recorded children and of 12 offspring evaluated now" in ask(capsys, *options, "--offspring", 12)
     (row,) = as_json(capsys, *options, "--offspring", 12, "--fresh-only")
     assert (row["recorded"], row["offspring"]) == (0, 12)
+
+
+def test_meta_evolvability_is_that_of_the_library(built, capsys):
+    archive = nc.load(built)
+    elite = archive.elite(int(archive.elites.niche[3]))
+    options = [built, "--elite", elite.state, "--meta", 6, "--seed", 2]
+    (row,) = as_json(capsys, *options, "--offspring", 4)
+    expected = evolvability.meta_evolvability(archive, elite, children=6, offspring=4, seed=2)
+    for name in ("value", "low", "high", "own", "lineages", "offspring", "failed"):
+        assert row[name] == pytest.approx(getattr(expected, name))
+    assert row["children"] == 6
+    shown = ask(capsys, *options)
+    assert "niches that 6 offspring of a child reach, mean over 6 children of the elite" in shown
+    assert "value" in ask(capsys, *options, "--format", "csv")
 
 
 def test_an_elite_without_recorded_children_says_so(built, capsys):
@@ -132,6 +147,11 @@ def test_table_stands_with_what_it_rests_on(built, capsys):
         (["--rank", "elites", "--elite", "4,4"], "--rank and --elite exclude each other"),
         (["--rank", "elites", "--method", "monte-carlo"], "elites are ranked in closed form"),
         (["--rank", "elites", "--uncertainty", "prior"], "--rank asks for elites"),
+        (["--meta", "5"], "--meta belongs to --elite"),
+        (["--elite", "4,4", "--meta", "1"], "--meta is 1"),
+        (["--elite", "4,4", "--meta", "5", "--offspring", "0"], "--offspring is 0"),
+        (["--elite", "4,4", "--meta", "5", "--l", "3"], "--l is 3, but belongs to what a chain foretells"),
+        (["--elite", "4,4", "--meta", "5", "--fresh-only"], "--fresh-only and --meta exclude each other"),
         (["--seed", "-1"], "--seed is -1"),
         (["--min-births", "-1"], "--min-births is -1"),
         (["--min-births", "100000"], "no niche has 100000 births"),

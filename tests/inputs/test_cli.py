@@ -46,6 +46,8 @@ _WALKS: dict[str, Sequence[str]] = {
     "k": _COUNT,
     "archive_limit": _COUNT,
     "archive_scope": _UNKNOWN,
+    "states": _COUNT,
+    "litter": _COUNT,
     "initialisation": ("no-such-thing", "normal:0", "normal:x", "orthogonal", "elites:/no/such/folder"),
     "grid": _GRID,
     "bounds": _BOUNDS,
@@ -182,6 +184,7 @@ TABLE: tuple[tuple[str, str, tuple[str, ...], Bad], ...] = (
             "unvisited": ("self", *_UNKNOWN),
             # Without --elite it is nobody's.
             "offspring": ("3", *_NATURAL),
+            "meta": ("3", *_COUNT),
             "rank": _UNKNOWN,
             "min_births": _NATURAL,
             "draws": _COUNT,
@@ -196,6 +199,12 @@ TABLE: tuple[tuple[str, str, tuple[str, ...], Bad], ...] = (
         "EvolvabilityCommand",
         ("{archive}", "--elite", "{niche}"),
         {"workers": _WORKERS, "cache_memory": _MEMORY, "offspring": _NATURAL, "rank": ("elites",)},
+    ),
+    (
+        "evolvability",
+        "EvolvabilityCommand",
+        ("{archive}", "--elite", "{niche}", "--meta", "3"),
+        {"meta": ("1", *_COUNT), "offspring": _COUNT, "l": ("3",), "draws": _COUNT},
     ),
     (
         "watch",
@@ -446,12 +455,6 @@ TABLE: tuple[tuple[str, str, tuple[str, ...], Bad], ...] = (
         "SensitivityCommand",
         ("arm", "--out", "{fresh}", "--vary", "k", "--metric", "kde", "--runs", "2", "--steps", "1"),
         {**_KDE, "scale": _POSITIVE},
-    ),
-    (
-        "walks pressure",
-        "PressureCommand",
-        ("arm", "--out", "{fresh}", "--runs", "2", "--steps", "1", "--metric", "evolvability"),
-        {"litter": _COUNT},
     ),
     (
         "walks population",

@@ -155,6 +155,7 @@ RESULTS = {
     "Measure",
     "MetastableSets",
     "NicheBand",
+    "MetaEvolvability",
     "NicheEvolvability",
     "NoveltyArchive",
     "Offspring",

@@ -13,6 +13,7 @@ from .table import (
     NOT_A_NUMBER,
     POSITIVE,
     RAGGED,
+    SEED,
     UNKNOWN,
     Call,
     World,
@@ -43,6 +44,16 @@ CALLS = (
             "first_generation": UNKNOWN,
             "strength": POSITIVE,
             **_ASKED,
+        },
+    ),
+    Call(
+        "evolvability.meta_evolvability",
+        lambda w: {"archive": w.archive, "elite": w.elite, "children": 3, "offspring": 2},
+        {
+            "children": whole(1),
+            "offspring": whole(0),
+            "lineages": (3, *whole(0)),
+            "seed": SEED,
         },
     ),
     Call(

@@ -58,10 +58,10 @@ CALLS = (
             "archive_limit": whole(0),
             "archive_scope": UNKNOWN,
             "states": whole(0),
+            "litter": whole(0),
             "initialisation": (*UNKNOWN, "normal:0", "normal:x", "elites:"),
         },
     ),
-    Call("studies.Condition", lambda w: {"label": "a", "metric": "evolvability"}, {"litter": whole(0)}),
     Call(
         "studies.Condition",
         lambda w: {"label": "a", "metric": "kde"},

@@ -113,7 +113,12 @@ CALLS = (
     Call(
         "plots.draw_study",
         lambda w: {"records": w.records, "step": 0},
-        {"records": _EMPTY, "step": (-1, 99, "last"), "conditions": _WALKS["conditions"]},
+        {
+            "records": _EMPTY,
+            "step": (-1, 99, "last"),
+            "conditions": _WALKS["conditions"],
+            "main": ("no-such-thing",),
+        },
     ),
     Call(
         "plots.explorer.page.write_explorer",

@@ -73,7 +73,7 @@ def test_seed_of_a_condition_depends_on_its_label_and_the_study_alone() -> None:
         ({"metric": "kde", "decay": 1.5}, "decay is 1.5"),
         ({"offspring": 0}, "offspring is 0"),
         ({"states": 0}, "states is 0"),
-        ({"metric": "evolvability", "litter": 0}, "offspring is 0"),
+        ({"metric": "evolvability", "litter": 0}, "litter is 0"),
         ({"mutation": "jump"}, "mutation is 'jump'"),
         ({"scale": -1.0}, "scale is -1.0"),
         ({"archive_limit": 0}, "archive_limit is 0"),

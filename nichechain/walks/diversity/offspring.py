@@ -7,10 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from nichechain.births.table import NONE
 from nichechain.core.checks import check_at_least
 from nichechain.core.errors import NichechainError
-from nichechain.core.rarefaction import distinct_among
+from nichechain.core.rarefaction import niches_among
 from nichechain.walks.diversity.metrics import Surroundings
 
 Floats = NDArray[np.float64]
@@ -78,6 +77,5 @@ class OffspringNiches:
         score = np.full(query.shape[:2], np.nan)
         for walk, place in np.argwhere(np.isfinite(query).all(axis=2)).tolist():
             landed = around.litters[walk, place]
-            counts = np.unique(landed[(landed != NONE) & (landed < around.niches)], return_counts=True)[1]
-            score[walk, place] = distinct_among(counts, landed.size, self.lineages or landed.size)
+            score[walk, place] = niches_among(landed, around.niches, self.lineages or landed.size)
         return score
