@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 from nichechain.births.table import NONE
 from nichechain.core.columns import Columnar
 from nichechain.search.lineages import Stretch
-from nichechain.search.selection import Listener, Told
+from nichechain.search.selection import Told
 
 Ints = NDArray[np.int64]
 
@@ -38,8 +38,16 @@ UNJUDGED = -1.0
 """Key of an elite that nobody has contested yet: below all that judged ones can have."""
 
 
-class Judge(Listener, Protocol):
+class Judge(Protocol):
     """What the l-evolvability of a genotype is, by its children and the births so far."""
+
+    def tell(self, births: Told) -> None:
+        """What became of some births."""
+        ...
+
+    def refresh(self) -> None:
+        """Genotypes are judged next."""
+        ...
 
     def __call__(self, children: Ints) -> float:
         """Expected number of niches, from the states of children (k,), ``NONE`` where one failed."""
@@ -95,10 +103,8 @@ class Contests:
 
     Attributes
     ----------
-    settled : Settled
-        Contests that ended before the present step.
     due : Due
-        Its births that judge.
+        Births of the present step that judge.
     """
 
     def __init__(self, stretch: Stretch, states: int, offspring: int, judge: Judge) -> None:
@@ -113,7 +119,6 @@ class Contests:
         self._children: dict[int, list[int]] = {}
         self._judging: frozenset[int] = frozenset()
         nobody = np.empty(0, np.int64)
-        self.settled = Settled(nobody, nobody, np.empty(0))
         self.due = Due(nobody, nobody, nobody)
 
     def tell(self, births: Told) -> None:
@@ -145,9 +150,9 @@ class Contests:
             self._children[uid] = []
         return np.array(contend, np.int64)
 
-    def begin(self, step: int) -> None:
-        """Settle what can be settled, and say who gets children in a step."""
-        self._judge.begin(step)
+    def settle(self) -> Settled:
+        """End the contests of which both sides have had their children, all births of a step being told."""
+        self._judge.refresh()
         ready = {
             niche: uid
             for niche, uid in self._contender.items()
@@ -155,7 +160,11 @@ class Contests:
         }
         ended = [self._settle(niche, uid) for niche, uid in ready.items()]
         niche, uid, value = zip(*ended, strict=True) if ended else ((), (), ())
-        self.settled = Settled(np.array(niche, np.int64), np.array(uid, np.int64), np.array(value))
+        return Settled(np.array(niche, np.int64), np.array(uid, np.int64), np.array(value))
+
+    def begin(self, step: int) -> None:
+        """Say who gets children in a step; whoever retraces births settles here what was settled then."""
+        self.settle()
         free = np.flatnonzero(self._stretch.slots(step)[0] == NONE)
         asked = chain.from_iterable(
             repeat((niche, uid), self._missing(uid))

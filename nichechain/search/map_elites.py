@@ -242,17 +242,20 @@ class MapElites:
         )
 
     def _judged(self, step: int) -> Elites:
-        """End contests before a step; elites and contenders that it may judge, sorted by uid."""
+        """Elites and contenders that a step may judge, sorted by uid."""
         if self._contests is None:
             return self._contenders
         self._contests.begin(step)
-        ended = self._contests.settled
+        return self._contestants(self._contests.due.niche)
+
+    def _settle(self, contests: Contests) -> None:
+        """End contests, all births of a step being kept."""
+        ended = contests.settle()
         if len(ended):
             both = self._contestants(ended.niche)
             won = both[np.searchsorted(both.uid, ended.uid)]
             self._archive.put(replace(won, key=ended.value))
             self._contenders = self._contenders[~np.isin(self._contenders.niche, ended.niche)]
-        return self._contestants(self._contests.due.niche)
 
     def _contestants(self, niche: Ints) -> Elites:
         """Elites and contenders of some niches, which may repeat, sorted by uid."""
@@ -301,6 +304,8 @@ class MapElites:
         self._selection.tell(told)
         if self._contests is not None:
             self._contenders = Elites.concatenate([self._contenders, kept(self._contests.hear(told))])
+            if not len(self._pending):
+                self._settle(self._contests)
         return births.make_table(offspring, evaluation, child_niche=niche, accepted=accepted, step=self.step)
 
     def _gone_on(

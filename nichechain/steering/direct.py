@@ -43,7 +43,7 @@ class OffspringCoverage:
     def tell(self, births: Told) -> None:
         """Nothing is remembered."""
 
-    def begin(self, step: int) -> None:
+    def refresh(self) -> None:
         """Nothing is to be prepared."""
 
     def __call__(self, children: Ints) -> float:
@@ -76,7 +76,7 @@ class OffspringLineages:
         """What became of some births."""
         self._chain.tell(births)
 
-    def begin(self, step: int) -> None:  # noqa: ARG002
+    def refresh(self) -> None:
         """Ask the chain again, if it has changed by much."""
         if self._chain.births and self._chain.due:
             self._chain.settle()

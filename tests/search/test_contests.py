@@ -33,7 +33,7 @@ class Sum:
     def tell(self, births):
         """Nothing is remembered."""
 
-    def begin(self, step):
+    def refresh(self):
         """Nothing is prepared."""
 
     def __call__(self, children):
@@ -64,16 +64,16 @@ def test_a_contested_niche_gets_children_of_both_and_the_better_keeps_it():
     assert due(found) == [(0, 5, 0), (1, 5, 0), (2, 5, 2), (3, 5, 2)]
     # Children made to judge fill niches, and contest none.
     assert found.hear(told(1, 3, (0, 1), (0, 6), (2, 7), (2, 1))).tolist() == []
-    found.begin(2)
+    ended = found.settle()
     # 1 + 6 is less than 7 + 1.
-    assert found.settled.niche.tolist() == [5]
-    assert found.settled.uid.tolist() == [2]
-    assert found.settled.value.tolist() == [8.0]
+    assert (ended.niche.tolist(), ended.uid.tolist(), ended.value.tolist()) == ([5], [2], [8.0])
+    assert not len(found.settle())
+    found.begin(2)
     assert due(found) == []
     # The winner has all the children that it needs, so only the next contender gets some.
     assert found.hear(told(2, 7, (2, 5), (1, 5), (1, 3), (1, NONE))).tolist() == [0]
+    assert not len(found.settle())
     found.begin(3)
-    assert not len(found.settled)
     assert due(found) == [(0, 5, 7), (1, 5, 7)]
 
 
@@ -87,8 +87,8 @@ def test_children_of_a_parent_count_and_equals_leave_the_elite():
     found.begin(2)
     assert due(found) == [(0, 6, 1), (1, 6, 3), (2, 6, 3)]
     found.tell(told(2, 7, (1, 4), (3, 4), (3, 6), (0, 9)))
-    found.begin(3)
-    assert (found.settled.uid.tolist(), found.settled.value.tolist()) == ([1], [10.0])
+    ended = found.settle()
+    assert (ended.uid.tolist(), ended.value.tolist()) == ([1], [10.0])
 
 
 def test_the_oldest_contest_comes_first_and_nobody_waits_twice():
@@ -101,7 +101,6 @@ def test_the_oldest_contest_comes_first_and_nobody_waits_twice():
     assert due(found) == [(0, 5, 0), (1, 5, 0), (2, 5, 2), (3, 5, 2)]
     found.tell(told(1, 6, (0, 5), (0, 5), (2, 5), (2, 5)))
     found.begin(2)
-    assert found.settled.uid.tolist() == [0]
     assert due(found) == [(0, 2, 1), (1, 2, 1), (2, 2, 3), (3, 2, 3)]
 
 

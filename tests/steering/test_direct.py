@@ -11,7 +11,7 @@ import pytest
 from nichechain import BuildConfig, GridNiches, Threads, build, load, verify
 from nichechain.chain.counts import TransitionCounts
 from nichechain.chain.estimators import estimate
-from nichechain.execution import Processes
+from nichechain.execution import Processes, evaluate_rows
 from nichechain.search.lineages import Stretch
 from nichechain.search.selection import Told
 from nichechain.steering import make_contests
@@ -54,7 +54,7 @@ def test_more_generations_go_on_from_the_children_by_the_chain(lineages):
     given = births()
     by = OffspringLineages(NICHES, 3, lineages)
     by.tell(given)
-    by.begin(1)
+    by.refresh()
     counts = TransitionCounts.from_births(
         given.parent_niche, given.child_niche, NICHES, elite=given.parent_uid
     )
@@ -72,7 +72,7 @@ def test_more_generations_go_on_from_the_children_by_the_chain(lineages):
 
 def test_before_there_are_births_nobody_is_known_to_go_anywhere():
     by = OffspringLineages(NICHES, 3, 2)
-    by.begin(1)
+    by.refresh()
     assert by(np.array([-1, -1])) == 0.0
 
 
@@ -88,14 +88,15 @@ def account(config: BuildConfig, rows: list[dict]) -> dict[int, int]:
         landed = children[uid]
         return float(np.mean([len(set(some) - {None}) for some in combinations(landed, m)]))
 
-    steps = sorted({row["step"] for row in rows})
-    for step in steps:
+    def settle() -> None:
         for niche, uid in list(contest.items()):
             both = elite[niche], uid
             if all(len(children[one]) >= m for one in both):
                 if value(uid) > value(elite[niche]) + 1e-6:
                     elite[niche] = uid
                 del contest[niche]
+
+    for step in sorted({row["step"] for row in rows}):
         # Those that judge come first, and take all that is not of lineages.
         lacking = [
             one
@@ -120,6 +121,8 @@ def account(config: BuildConfig, rows: list[dict]) -> dict[int, int]:
                 elite[niche] = uid
             elif not judges and not row["lineage"] and niche not in contest:
                 contest[niche] = uid
+        if sum(row["step"] == step for row in rows) == (config.batch if step else config.initial):
+            settle()
     return elite
 
 
@@ -154,6 +157,33 @@ def test_workers_and_interruptions_change_nothing_and_verify_replays(tmp_path, l
                 path.read_bytes() == (tmp_path / "often" / path.relative_to(tmp_path / "whole")).read_bytes()
             )
     assert verify(tmp_path / "whole", sample=None).ok
+
+
+class Failing:
+    """An executor that raises at one of its calls."""
+
+    def __init__(self, call: int) -> None:
+        self._left = call
+
+    def evaluate(self, domain, genotypes, on_done=None):  # noqa: ARG002
+        self._left -= 1
+        if not self._left:
+            raise KeyboardInterrupt
+        return evaluate_rows(domain, genotypes)
+
+
+def test_what_an_interrupt_leaves_is_verified_and_goes_on(tmp_path):
+    config = replace(CONFIG, evaluations=600, offspring=3)
+    with Threads(1) as executor:
+        whole = build(config, tmp_path / "whole", executor)
+        assert (whole.elites.key >= 0).sum() > 5
+        for call in range(2, 15):
+            folder = tmp_path / str(call)
+            with pytest.raises(KeyboardInterrupt):
+                build(config, folder, Failing(call))
+            assert verify(folder, sample=0).ok
+            build(config, folder, executor)
+            assert (folder / "meta.json").read_bytes() == (tmp_path / "whole" / "meta.json").read_bytes()
 
 
 def test_it_keeps_what_the_map_makes_evolvable(tmp_path):
