@@ -102,10 +102,10 @@ class Study:
             for condition in self.conditions:
                 pressure_of(condition.level)
         if self.kind == "population":
-            for condition in self.conditions:
-                if condition.width < 2:
+            for one in self.conditions:
+                if one.width < 2:
                     raise NichechainError(
-                        f"states of {condition.label!r} is {condition.states}, but must be at least 2"
+                        f"condition {one.label!r} has states {one.states}, but must have at least 2"
                     )
         GridNiches(self.shape, self.bounds)
         object.__setattr__(self, "domain_options", plain_options(self.domain_options))

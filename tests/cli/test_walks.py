@@ -181,7 +181,7 @@ def test_help(capsys):
         (["pressure", "arm", "--offspring", "0"], "offspring is 0"),
         (["pressure", "arm", "--runs", "0"], "runs is 0"),
         (["pressure", "arm", "--states", "0"], "states is 0"),
-        (["population", "arm", "--states", "1"], "states of 'kde' is 1, but must be at least 2"),
+        (["population", "arm", "--states", "1"], "'kde' has states 1, but must have at least 2"),
         (["pressure", "arm", "--metric", "evolvability", "--litter", "0"], "litter is 0"),
         (["pressure", "arm", "--steps", "-1"], "steps is -1"),
         (["pressure", "arm", "--seed", "-1"], "seed is -1"),
