@@ -95,6 +95,10 @@ def build(
                 retrace(selection, Told.of(rows))
             if contests is not None:
                 retrace(contests, Told.of(rows))
+                if not contests.agree(state):
+                    raise ArchiveError(
+                        f"{folder} is damaged: its elites or contenders are not those of its births"
+                    )
             outside = count(rows, len(niches))
             failures.count(rows)
             del rows

@@ -29,6 +29,7 @@ from numpy.typing import NDArray
 
 from nichechain.births.table import NONE
 from nichechain.core.columns import Columnar
+from nichechain.search.elites import SearchState
 from nichechain.search.lineages import Stretch
 from nichechain.search.selection import Told
 
@@ -149,6 +150,16 @@ class Contests:
                 continue
             self._children[uid] = []
         return np.array(contend, np.int64)
+
+    def agree(self, state: SearchState) -> bool:
+        """Whether elites and contenders of a search are those that its births, all told, have led to."""
+        if not len(state.pending):
+            self.settle()
+        held, contested = (
+            dict(zip(rows.niche.tolist(), rows.uid.tolist(), strict=True))
+            for rows in (state.elites, state.contenders)
+        )
+        return self._elite == held and self._contender == contested
 
     def settle(self) -> Settled:
         """End the contests of which both sides have had their children, all births of a step being told."""

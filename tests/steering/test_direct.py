@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 
 from nichechain import BuildConfig, GridNiches, Threads, build, load, verify
+from nichechain.archive import read
 from nichechain.chain.counts import TransitionCounts
 from nichechain.chain.estimators import estimate
+from nichechain.core.errors import ArchiveError
 from nichechain.execution import Processes, evaluate_rows
 from nichechain.search.lineages import Stretch
 from nichechain.search.selection import Told
@@ -184,6 +186,18 @@ def test_what_an_interrupt_leaves_is_verified_and_goes_on(tmp_path):
             assert verify(folder, sample=0).ok
             build(config, folder, executor)
             assert (folder / "meta.json").read_bytes() == (tmp_path / "whole" / "meta.json").read_bytes()
+
+
+def test_a_state_that_is_not_that_of_the_births_is_refused(tmp_path, monkeypatch):
+    config = replace(CONFIG, evaluations=400)
+    with Threads(1) as executor:
+        build(config, tmp_path / "a", executor)
+        state = read.read_state(tmp_path / "a", read.read_meta(tmp_path / "a"))
+        assert len(state.contenders)
+        fewer = replace(state, contenders=state.contenders[1:])
+        monkeypatch.setattr(read, "read_state", lambda *_: fewer)
+        with pytest.raises(ArchiveError, match="its elites or contenders are not those of its births"):
+            build(replace(config, evaluations=500), tmp_path / "a", executor)
 
 
 def test_it_keeps_what_the_map_makes_evolvable(tmp_path):
