@@ -3,7 +3,7 @@
 Searches by uniform parents and by other selections, paired by seed. At several numbers of births the
 90 % interval of 5-evolvability is computed for the niches that both searches of a pair had filled by
 the first of these numbers. Births needed for the width that the selection ends with are interpolated in
-logarithms on the course of the uniform search.
+logarithms along the course of the uniform search.
 
     python benchmarks/information.py [--tasks arm cosinus] [--seeds 5] [--selections information]
 
@@ -40,19 +40,21 @@ def main() -> None:
     parser.add_argument("--tasks", nargs="+", default=list(TASKS), choices=list(TASKS))
     parser.add_argument("--selections", nargs="+", default=["information"])
     parser.add_argument("--seeds", type=int, default=5)
+    parser.add_argument("--temperature", type=float, help="by default that of the package")
     given = parser.parse_args()
     print("task       selection       births for the mean width   for the width of the mean")
     for task in given.tasks:
         for selection in given.selections:
             found = []
             for seed in range(given.seeds):
-                one, other = (_births(task, name, seed) for name in ("uniform", selection))
+                one = _births(task, "uniform", seed, None)
+                other = _births(task, selection, seed, given.temperature)
                 niches = np.intersect1d(*(_filled(births) for births in (one, other)))
                 found.append(_saved(_widths(one, task, niches), _widths(other, task, niches)))
             print(f"{task:10} {selection:15} {_interval(found, 0):27} {_interval(found, 1)}", flush=True)
 
 
-def _births(task: str, selection: str, seed: int):
+def _births(task: str, selection: str, seed: int, temperature: float | None):
     shape, bounds, scale = TASKS[task]
     config = nc.BuildConfig(
         "arm" if task.startswith("arm") else task,
@@ -62,6 +64,7 @@ def _births(task: str, selection: str, seed: int):
         scale=scale,
         seed=seed,
         selection=selection,
+        temperature=temperature,
         lineage_share=0.0,
     )
     with tempfile.TemporaryDirectory() as folder, nc.Threads(1) as threads:
@@ -94,11 +97,11 @@ def _widths(births, task: str, niches: np.ndarray) -> np.ndarray:
 
 def _saved(uniform: np.ndarray, other: np.ndarray) -> np.ndarray:
     """Births over those of the uniform search at the same width, (2,)."""
-    at = np.log(AT)
     saved = []
     for course, reached in zip(np.log(uniform), np.log(other[:, -1]), strict=True):
-        slope, start = np.polyfit(at, course, 1)
-        saved.append(AT[-1] / np.exp((reached - start) / slope))
+        # The slope of the whole course says how much a birth narrows; it goes through the last point.
+        slope = np.polyfit(np.log(AT), course, 1)[0]
+        saved.append(float(np.exp((course[-1] - reached) / slope)))
     return np.array(saved)
 
 
