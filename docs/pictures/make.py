@@ -1,21 +1,25 @@
-"""Draw the pictures of the documentation, from the shipped archive and the examples.
+"""Draw the pictures of the documentation, from the shipped archive, results and the examples.
 
 ``python docs/pictures/make.py [NAME ...]`` draws all of them, or those of the given names, beside
-this file; all together it takes about two minutes.
+this file; all together it takes some minutes. ``explorer`` needs Selenium and Chromium.
 """
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import runpy
+import shutil
 import sys
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 
 import matplotlib.pyplot as plt
 import numpy as np
+import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.colors import PowerNorm
 from matplotlib.figure import Figure
@@ -25,7 +29,18 @@ from PIL import Image
 import nichechain as nc
 from nichechain import plots
 from nichechain.chain.structure.wormholes import wormholes
+from nichechain.plots.explorer import write_explorer
+from nichechain.plots.landscape import MAPS, plot_landscape
 from nichechain.plots.style import EDGE, EMPTY, INK, LONG_JUMP, START, behavior_axes
+from nichechain.plots.validation import (
+    plot_calibration,
+    plot_filling,
+    plot_reached,
+    plot_scores,
+    plot_surprise,
+)
+from nichechain.plots.walks import draw_study
+from nichechain.validation import Lineages, compare, grid_size
 from nichechain.walks import diversity
 
 # Twice what a page shows, so that letters stay sharp.
@@ -33,6 +48,7 @@ _DPI = 160
 
 HERE = Path(__file__).resolve().parent
 EXAMPLES = HERE.parents[1] / "examples"
+RESULTS = EXAMPLES / "results"
 ROOT = (14, 14)
 
 ARCHIVE = nc.load("fetch-pick-and-place")
@@ -222,6 +238,49 @@ def between(figure: Figure) -> None:
     ax.spines[["top", "right"]].set_visible(False)
 
 
+def calibration(figure: Figure) -> None:
+    """What lineages of 100 elites reached, beside what the chain says."""
+    figure.set_size_inches(13, 4.6)
+    figure.set_layout_engine("constrained")
+    with np.load(RESULTS / "truth" / "fetch-1.npz") as kept:
+        found = Lineages(*(kept[name].astype(np.int64) for name in ("root_niche", "niches", "offspring")))
+    check = compare(CHAIN, found, ARCHIVE.niches)
+    one, five, all_of_them = figure.subplots(1, 3)
+    plot_calibration(check, one, generation=1)
+    plot_calibration(check, five, generation=5)
+    plot_reached(check, all_of_them)
+
+
+def sweep(figure: Figure) -> None:
+    """Grids of several sizes over the births."""
+    figure.set_size_inches(13, 4.6)
+    found = grid_size.sweep(ARCHIVE)
+    left, middle, right = figure.subplots(1, 3, gridspec_kw={"wspace": 0.3})
+    plot_filling(found, left)
+    plot_surprise(found, middle)
+    plot_scores(found, right)
+
+
+def landscape(figure: Figure) -> None:
+    """Maps of every elite's measures, from the table that the command left."""
+    table = pd.read_csv(RESULTS / "landscape" / "fetch-pick-and-place.csv")
+    told = json.loads((RESULTS / "landscape" / "fetch-pick-and-place.json").read_text())
+    found = SimpleNamespace(
+        dissimila=table["dissimilum"].to_numpy(bool),
+        neutral=table["neutral"].to_numpy(bool),
+        threshold=told["dissimila"]["threshold"],
+    )
+    measured = SimpleNamespace(
+        niches=ARCHIVE.niches,
+        state=table["niche"].to_numpy(),
+        measures={name: table[name].to_numpy(float) for name in MAPS},
+        dissimila=found,
+        parent=table[["behavior_x", "behavior_y"]].to_numpy(),
+        unit=told["unit"],
+    )
+    plot_landscape(ARCHIVE, measured, figure)
+
+
 PICTURES: dict[str, Callable[[Figure], None]] = {
     "visits": visits,
     "evolvability": evolvability,
@@ -234,7 +293,15 @@ PICTURES: dict[str, Callable[[Figure], None]] = {
     "local_measures": local_measures,
     "diversity": metrics,
     "between": between,
+    "landscape": landscape,
+    "calibration": calibration,
+    "sweep": sweep,
 }
+TITLES = {
+    "pressure": "Evolutionary pressure and evolvability, on fetch",
+    "metrics": "Diversity metrics and evolvability, on fetch",
+}
+"""Studies of walks whose records are in the results."""
 
 
 def _family() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -307,6 +374,43 @@ def draw_example(path: Path) -> None:
     print(f"wrote {out}")
 
 
+def draw_walks(name: str) -> None:
+    """The figure of a study of walks, from its records."""
+    told = json.loads((RESULTS / name / "statistics.json").read_text())["study"]
+    records = pd.read_parquet(RESULTS / name / "records.parquet")
+    figure = draw_study(
+        records,
+        step=int(records["step"].max()),
+        conditions=[condition["label"] for condition in told["conditions"]],
+        ordered=name == "pressure",
+        unit="m",
+        title=TITLES[name],
+    )
+    _save(figure, name)
+
+
+def draw_explorer() -> None:
+    """The explorer's page, as a browser shows it."""
+    from selenium import webdriver
+
+    options = webdriver.ChromeOptions()
+    options.binary_location = str(shutil.which("chromium"))
+    for argument in ("headless", "no-sandbox", "disable-gpu", "window-size=1280,1000"):
+        options.add_argument(f"--{argument}")
+    service = webdriver.ChromeService(shutil.which("chromedriver"))
+    with tempfile.TemporaryDirectory() as folder:
+        page = Path(folder) / "explore.html"
+        write_explorer(ARCHIVE, CHAIN, page)
+        browser = webdriver.Chrome(options=options, service=service)
+        try:
+            browser.get(f"{page.as_uri()}#niche=14,14")
+            browser.save_screenshot(str(HERE / "explorer.png"))
+        finally:
+            browser.quit()
+    shrink(HERE / "explorer.png")
+    print(f"wrote {HERE / 'explorer.png'}")
+
+
 def draw_gallery() -> None:
     """Run the blocks of the gallery, which write its pictures, and keep these."""
     before, names = Path.cwd(), {}
@@ -328,23 +432,35 @@ def draw_gallery() -> None:
             print(f"wrote {out / picture.name}")
 
 
-def main(names: list[str]) -> None:
-    """Draw all pictures, or those of the given names."""
-    examples = {path.stem: path for path in EXAMPLES.glob("0[1-4]_*.py")}
-    for name in names or [*PICTURES, "gallery", *sorted(examples)]:
-        if name == "gallery":
-            draw_gallery()
-            continue
-        if name in examples:
-            draw_example(examples[name])
-            continue
+def _save(figure: Figure, name: str) -> None:
+    out = HERE / f"{name}.png"
+    # A layout of its own keeps to the size asked for.
+    figure.savefig(out, dpi=_DPI, bbox_inches=None if figure.get_layout_engine() else "tight")
+    shrink(out)
+    print(f"wrote {out}")
+
+
+def draw(name: str) -> None:
+    """Draw the picture of that name, as it is made."""
+    if name in TITLES:
+        draw_walks(name)
+    elif name in MADE_OTHERWISE:
+        MADE_OTHERWISE[name]()
+    elif name in NUMBERED:
+        draw_example(NUMBERED[name])
+    else:
         figure = Figure()
         PICTURES[name](figure)
-        out = HERE / f"{name}.png"
-        figure.savefig(out, dpi=_DPI, bbox_inches="tight")
-        shrink(out)
-        print(f"wrote {out}")
+        _save(figure, name)
+
+
+MADE_OTHERWISE: dict[str, Callable[[], None]] = {
+    "explorer": draw_explorer,
+    "gallery": draw_gallery,
+}
+NUMBERED = {path.stem: path for path in EXAMPLES.glob("0[1-4]_*.py")}
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    for picture in sys.argv[1:] or [*PICTURES, *TITLES, *MADE_OTHERWISE, *sorted(NUMBERED)]:
+        draw(picture)

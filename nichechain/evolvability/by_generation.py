@@ -19,8 +19,9 @@ from nichechain.core.checks import check_at_least
 from nichechain.core.intervals import drawn_interval
 from nichechain.core.randomness import Purpose, keyed
 from nichechain.evolvability.averaging import spread_of, widened
-from nichechain.evolvability.question import MOST_EXACT, DrawnChain, Question, dense, told
+from nichechain.evolvability.question import MOST_EXACT, DrawnChain, Question, dense
 from nichechain.evolvability.urns import hit_probabilities
+from nichechain.execution.side_by_side import side_by_side
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -153,22 +154,32 @@ def _simulated(
 ) -> Floats:
     """The same by lineages that draw rows of T as they enter them."""
     assert chain.posterior is not None
-    n, lineages = chain.n_niches, 2 * max(sizes)
+    posterior, n, lineages = chain.posterior, chain.n_niches, 2 * max(sizes)
     half = lineages // 2
     tables = [np.stack([hit_probabilities(size, u) for u in sizes]) for size in (lineages, half)]
-    drawn = np.empty((question.draws, len(sizes), longest, n))
-    noise = np.zeros((len(sizes), longest, n))
     at_once = max(1, _DESCENDANTS // (lineages * (longest + 1)))
-    for draw in told(range(question.draws), on_done):
+
+    def reached(draw: int) -> tuple[Floats, Floats]:
+        """Niches that lineages visit on one draw of T, and the simulation's variance, (k, longest, n)."""
         rng = keyed(question.seed, Purpose.WALKS, draw)
-        urns = urns_of(chain.posterior, keyed(question.seed, Purpose.POSTERIOR, draw))
+        urns = urns_of(posterior, keyed(question.seed, Purpose.POSTERIOR, draw))
+        parts = []
         for start in range(0, n, at_once):
             roots = np.arange(start, min(start + at_once, n))
             first = np.repeat(roots, lineages).reshape(-1, lineages)
             states = urns.walks(first, longest, rng, roots=True)[:, lineages:]
-            whole, halves = _count(states, lineages, n, longest, *tables)
-            drawn[draw, :, :, roots] = whole
-            noise[:, :, roots] += np.moveaxis(halves, 0, 2) / question.draws
+            parts.append(_count(states, lineages, n, longest, *tables))
+        whole, halves = (
+            np.ascontiguousarray(np.moveaxis(np.concatenate(found), 0, 2))
+            for found in zip(*parts, strict=True)
+        )
+        return whole, halves
+
+    found = side_by_side(reached, range(question.draws), on_done)
+    drawn = np.stack([whole for whole, _ in found])
+    noise = np.zeros(drawn.shape[1:])
+    for _, halves in found:
+        noise += halves / question.draws
     mean, low, high = _by_spread(drawn, noise)
     return np.stack([mean, *widened(mean, low, high, spread_of(chain), n)])
 

@@ -6,6 +6,7 @@ from collections import Counter
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from nichechain.core.checks import check_at_least
 from nichechain.core.text import some
@@ -19,6 +20,8 @@ if TYPE_CHECKING:
 
     from nichechain.archive.archive import Archive
     from nichechain.chain import NicheChain
+
+Floats = NDArray[np.float64]
 
 _WIDEST = 3.0
 _LARGEST = 110.0
@@ -198,7 +201,8 @@ def _arrows(ax: Axes, graph: nx.DiGraph, edges: list[tuple[int, int]], color: st
 
 _BEND = 0.15
 _MOST_LABELS = 12
-_LABELS_AT = (0.35, 0.65)
+# Size of a label, as shares of the map's width and height.
+_LABEL = np.array([0.15, 0.035])
 
 
 def plot_wormholes(archive: Archive, found: pd.DataFrame, ax: Axes | None = None) -> Axes:
@@ -244,7 +248,7 @@ def plot_wormholes(archive: Archive, found: pd.DataFrame, ax: Axes | None = None
     colors = LinearSegmentedColormap.from_list("sure", colormaps["plasma_r"](np.linspace(0.25, 1.0, 64)))
     scale = ScalarMappable(Normalize(low, 1.0), colors)
     centers = archive.niches.centers
-    for number, row in enumerate(flagged.itertuples()):
+    for row in flagged.itertuples():
         strength = float(np.sqrt(row.probability))
         color = scale.to_rgba(row.exceeds)
         ax.add_patch(
@@ -265,23 +269,20 @@ def plot_wormholes(archive: Archive, found: pd.DataFrame, ax: Axes | None = None
             )
         )
         ax.plot(*centers[row.parent], "o", color=color, markersize=6, markeredgecolor="white", zorder=6)
-        if number >= len(flagged) - _MOST_LABELS:
-            start, end = centers[row.parent], centers[row.child]
-            way = end - start
-            corner = start + way / 2 + _BEND * np.array([way[1], -way[0]])
-            # At places of their own along the curves: two that end in one niche lie close.
-            t = _LABELS_AT[number % len(_LABELS_AT)]
-            ax.annotate(
-                f"{row.count}/{row.exposure}",
-                (1 - t) ** 2 * start + 2 * t * (1 - t) * corner + t**2 * end,
-                fontsize="medium",
-                fontweight="bold",
-                color=INK,
-                ha="center",
-                va="center",
-                zorder=7,
-                path_effects=[withStroke(linewidth=3.5, foreground="white")],
-            )
+    surest = flagged.tail(_MOST_LABELS)
+    curves = [_curve(centers[row.parent], centers[row.child]) for row in flagged.itertuples()]
+    for row, place in zip(surest.itertuples(), _label_places(curves, len(surest), ax), strict=True):
+        ax.annotate(
+            f"{row.count}/{row.exposure}",
+            tuple(place),
+            fontsize="medium",
+            fontweight="bold",
+            color=INK,
+            ha="center",
+            va="center",
+            zorder=7,
+            path_effects=[withStroke(linewidth=3.5, foreground="white")],
+        )
     colorbar(ax, scale, "posterior probability of being one")
     singles = int(flagged["singleton"].sum())
     ax.set_title(f"Wormholes: {len(flagged)} of {some(len(found), 'observed transition')}", pad=10)
@@ -293,3 +294,46 @@ def plot_wormholes(archive: Archive, found: pd.DataFrame, ax: Axes | None = None
     false = float(flagged["cumulated_false"].max()) if len(flagged) else 0.0
     key(ax, *handles, note=f"shade: births; {false:.2g} of the {len(flagged)} are expected to be none")
     return ax
+
+
+def _curve(start: Floats, end: Floats) -> Floats:
+    """Points along an arrow, (21, 2)."""
+    way = end - start
+    corner = start + way / 2 + _BEND * np.array([way[1], -way[0]])
+    t = np.linspace(0.0, 1.0, 21)[:, None]
+    curve: Floats = (1 - t) ** 2 * start + 2 * t * (1 - t) * corner + t**2 * end
+    return curve
+
+
+def _label_places(curves: list[Floats], labels: int, ax: Axes) -> list[Floats]:
+    """Where the last so many arrows have their labels: on their own or beside it, away from all others."""
+    low, high = np.transpose([ax.get_xlim(), ax.get_ylim()])
+    size = _LABEL * (high - low)
+    places: list[Floats] = []
+    for number in range(len(curves) - labels, len(curves)):
+        # Neither at the arrowhead nor where it begins.
+        along = curves[number][2:18]
+        aside = np.array([[0.0, 0.0], [-0.65, 0.0], [0.65, 0.0]]) * size
+        options = (along + aside[:, None]).reshape(-1, 2)
+        others = np.concatenate(
+            [np.empty((0, 2)), *(curve for place, curve in enumerate(curves) if place != number)]
+        )
+        cost = 0.1 * np.tile(np.abs(np.linspace(-1.0, 1.0, len(along))), 3)
+        cost += np.repeat([0.0, 0.3, 0.3], len(along))
+        cost += 2.0 * ((options - 0.45 * size < low) | (options + 0.45 * size > high)).any(axis=1)
+        cost += 1.0 * (_nearest(options, others, size / 2) < 1.0)
+        # A label belongs to the arrow that is nearest to it.
+        cost += 3.0 * (_nearest(options, others, size) < _nearest(options, along, size))
+        if places:
+            # One line of space between two labels.
+            cost += 4.0 * (_nearest(options, np.array(places), size * (1.0, 2.0)) < 1.0)
+        places.append(options[int(np.argmin(cost))])
+    return places
+
+
+def _nearest(points: Floats, taken: Floats, size: Floats) -> Floats:
+    """Distance of each point to the nearest that is taken, in sizes, along the axis that parts them more."""
+    if not len(taken):
+        return np.full(len(points), np.inf)
+    apart: Floats = (np.abs(points[:, None] - taken[None]) / size).max(axis=2).min(axis=1)
+    return apart

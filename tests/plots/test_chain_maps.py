@@ -136,3 +136,14 @@ def test_no_wormholes_is_a_picture_too(archive, ax):
     plot_wormholes(archive, found, ax)
     assert not ax.patches
     ax.get_figure().canvas.draw()
+
+
+def test_labels_of_wormholes_keep_off_each_other():
+    archive = nc.load("fetch-pick-and-place")
+    ax = plot_wormholes(archive, wormholes(archive.chain(), beyond="both"), Figure().subplots())
+    labels = [text for text in ax.texts if "/" in text.get_text()]
+    assert len(labels) == 5
+    size = np.array([0.5, 0.7]) * (0.15, 0.035)
+    places = np.array([label.get_position() if label.xyann is None else label.xyann for label in labels])
+    apart = (np.abs(places[:, None] - places[None]) / size).max(axis=2)
+    assert apart[~np.eye(5, dtype=bool)].min() >= 1.0
