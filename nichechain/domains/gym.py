@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 import io
+import operator
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -335,7 +337,8 @@ class GymDomain(ShownDomain):
                     )
                 if np.isfinite(described).all():
                     behavior[i] = described
-                    objective[i] = sum(episode.rewards.tolist())
+                    # Not sum(), which rounds otherwise from Python 3.12 on.
+                    objective[i] = functools.reduce(operator.add, episode.rewards.tolist(), 0.0)
                 else:
                     reasons[i] = "behavior is not finite"
             # Not before the descriptor is done with its state.
