@@ -38,8 +38,8 @@ _NOTE = 62
 
 # Height of a strip that shows one axis of behavior, over its width.
 _STRIP = 0.18
-# Distance of the legend from the map, over the map's height.
-_LEGEND = 0.09
+# Distance of the legend from the map, in inches: ticks and the name of an axis stand between.
+_LEGEND = 0.42
 
 
 def axes_of(ax: Axes | None) -> Axes:
@@ -138,12 +138,17 @@ def colorbar(ax: Axes, mappable: ScalarMappable, label: str) -> None:
 
 def key(ax: Axes, *handles: Any, note: str | None = None) -> None:
     """A legend under the map, where it hides nothing, and under it where the numbers come from."""
+    from matplotlib.transforms import ScaledTranslation
+
+    figure = ax.get_figure()
+    assert figure is not None
     shown = [*handles, *ax.get_legend_handles_labels()[0]]
     if shown or note:
         legend = ax.legend(
             handles=shown,
             loc="upper center",
-            bbox_to_anchor=(0.5, -_LEGEND / (ax.get_box_aspect() or 1.0)),
+            bbox_to_anchor=(0.5, 0.0),
+            bbox_transform=ax.transAxes + ScaledTranslation(0.0, -_LEGEND, figure.dpi_scale_trans),
             ncols=2 if len(shown) == 4 else min(3, max(1, len(shown))),
             frameon=False,
             fontsize="small",
