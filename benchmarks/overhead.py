@@ -39,7 +39,7 @@ from nichechain.domains import Evaluation, FetchPickAndPlace, PlanarArm
 from nichechain.domains.base import Domain
 from nichechain.execution import Executor, Threads, available_cpus
 from nichechain.search.config import BuildConfig
-from nichechain.variation.brood import Brood, litters
+from nichechain.variation.unborn import Unborn, litters
 
 LATENCY = 1 / 35
 """Seconds of a Fetch rollout."""
@@ -72,7 +72,7 @@ class Stopwatch:
     def evaluate(
         self,
         domain: Domain,
-        genotypes: NDArray[np.float32] | Brood,
+        genotypes: NDArray[np.float32] | Unborn,
         on_done: Callable[[int], None] | None = None,
     ) -> Evaluation:
         """Evaluate, and note how long it took."""

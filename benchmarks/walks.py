@@ -23,7 +23,7 @@ from nichechain import domains, variation
 from nichechain.domains.base import Domain, Evaluation
 from nichechain.execution import Threads, available_cpus
 from nichechain.niches import GridNiches
-from nichechain.variation.brood import Brood
+from nichechain.variation.unborn import Unborn
 from nichechain.walks import Selective, TopFraction, Uniform, WalkConfig, Walks, diversity, walk
 from nichechain.walks.diversity import metrics
 
@@ -40,7 +40,7 @@ class Stopwatch:
     def evaluate(
         self,
         domain: Domain,
-        genotypes: NDArray[np.float32] | Brood,
+        genotypes: NDArray[np.float32] | Unborn,
         on_done: Callable[[int], None] | None = None,
     ) -> Evaluation:
         """Evaluate, or give what was evaluated before."""

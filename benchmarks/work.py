@@ -35,7 +35,7 @@ from nichechain.search.config import BuildConfig
 from nichechain.studies.conditions import Condition
 from nichechain.studies.running import run as walk_study
 from nichechain.studies.study import Study, pressure_conditions
-from nichechain.variation.brood import Brood, grown
+from nichechain.variation.unborn import Unborn, grown
 
 THREADS = 2
 GRID, BOUNDS = (20, 20), FetchPickAndPlace.bounds
@@ -62,7 +62,7 @@ class Compared:
     def evaluate(
         self,
         domain: Domain,  # noqa: ARG002  # the executor's own, with and without the cache
-        genotypes: NDArray[np.float32] | Brood,
+        genotypes: NDArray[np.float32] | Unborn,
         on_done: Callable[[int], None] | None = None,
     ) -> Evaluation:
         """The rows, from the engine with the cache."""

@@ -38,7 +38,7 @@ from numpy.typing import NDArray
 from nichechain.core.columns import Columnar
 from nichechain.core.errors import NichechainError
 from nichechain.domains.base import Evaluation
-from nichechain.variation.brood import Brood, grown
+from nichechain.variation.unborn import Unborn, grown
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -56,8 +56,8 @@ class Offspring(Columnar):
 
     Parameters
     ----------
-    genotype : (N, P) float32 array or Brood
-        A brood where who evaluates is to grow them.
+    genotype : (N, P) float32 array or Unborn
+        Unborn children where who evaluates is to grow them.
     uid : (N,) int64 array
     parent_uid, parent_niche : (N,) int64 arrays
         ``NONE`` for initial births.
@@ -66,7 +66,7 @@ class Offspring(Columnar):
         Whose parent is the latest birth of a lineage.
     """
 
-    genotype: NDArray[np.float32] | Brood
+    genotype: NDArray[np.float32] | Unborn
     uid: NDArray[np.int64]
     parent_uid: NDArray[np.int64]
     parent_niche: NDArray[np.int64]

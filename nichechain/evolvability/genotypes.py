@@ -19,7 +19,7 @@ from nichechain.evolvability.coverage import rarefied_coverage
 from nichechain.evolvability.question import DRAWS, Convention, Method, Question, Root
 from nichechain.evolvability.record import draw_children, own_strength, recorded_children
 from nichechain.evolvability.results import Evolvability
-from nichechain.variation.brood import litters
+from nichechain.variation.unborn import litters
 
 if TYPE_CHECKING:
     from nichechain.archive.archive import Archive, Elite

@@ -14,7 +14,7 @@ from nichechain.core.errors import NichechainError
 from nichechain.core.intervals import mean_interval
 from nichechain.core.randomness import Purpose
 from nichechain.core.rarefaction import niches_among
-from nichechain.variation.brood import Brood, litters
+from nichechain.variation.unborn import Unborn, litters
 
 if TYPE_CHECKING:
     from nichechain.archive.archive import Archive, Elite
@@ -112,10 +112,10 @@ def meta_evolvability(
     size = most if lineages is None else lineages
     mutate = archive.mutate
 
-    def landed(brood: Brood) -> Ints:
+    def landed(unborn: Unborn) -> Ints:
         domain = archive.domain
-        found = domain.evaluate(brood.grow()) if executor is None else executor.evaluate(domain, brood)
-        state = np.full(len(brood), NONE, np.int64)
+        found = domain.evaluate(unborn.grow()) if executor is None else executor.evaluate(domain, unborn)
+        state = np.full(len(unborn), NONE, np.int64)
         state[~found.failed] = archive.niches.of(found.behavior[~found.failed])
         return state
 
@@ -127,7 +127,7 @@ def meta_evolvability(
         parent = np.repeat(np.arange(fine.size), offspring)
         # By the number of the child, whoever else failed.
         number = (fine[:, None] * offspring + np.arange(offspring)).ravel()
-        second = Brood(mutate, Purpose.GRANDCHILD, first[fine].grow(), (seed,) * fine.size, parent, number)
+        second = Unborn(mutate, Purpose.GRANDCHILD, first[fine].grow(), (seed,) * fine.size, parent, number)
         niches = len(archive.niches)
         for child, states in zip(fine.tolist(), landed(second).reshape(fine.size, offspring), strict=True):
             values[child] = niches_among(states, niches, size)

@@ -15,7 +15,7 @@ from nichechain.core.checks import check_at_least
 from nichechain.core.errors import NichechainError
 from nichechain.core.text import printable
 from nichechain.domains.base import Domain, Evaluation
-from nichechain.variation.brood import Brood, grown
+from nichechain.variation.unborn import Unborn, grown
 
 WORKER_DIED = "worker died"
 """Why a row failed that no worker outlives."""
@@ -29,7 +29,7 @@ class Executor(Protocol):
     def evaluate(
         self,
         domain: Domain,
-        genotypes: NDArray[np.float32] | Brood,
+        genotypes: NDArray[np.float32] | Unborn,
         on_done: Callable[[int], None] | None = None,
     ) -> Evaluation:
         """The rows of ``evaluate_rows(domain, genotypes)``, in order, to the bit.
@@ -37,8 +37,9 @@ class Executor(Protocol):
         Parameters
         ----------
         domain : Domain
-        genotypes : (N, P) float32 array or Brood
-            N at least 1. A brood is best grown by who evaluates it; ``numpy.asarray`` grows it, too.
+        genotypes : (N, P) float32 array or Unborn
+            N at least 1. Unborn children are best grown by who evaluates them; ``numpy.asarray`` grows
+            them, too.
         on_done : callable, optional
             Told how many more have been evaluated.
 
@@ -52,13 +53,13 @@ class Executor(Protocol):
         ...
 
 
-def evaluate_rows(domain: Domain, genotypes: NDArray[np.float32] | Brood) -> Evaluation:
+def evaluate_rows(domain: Domain, genotypes: NDArray[np.float32] | Unborn) -> Evaluation:
     """Evaluate genotypes here; one for which the domain raises has failed, and only that one.
 
     Parameters
     ----------
     domain : Domain
-    genotypes : (N, P) float32 array or Brood
+    genotypes : (N, P) float32 array or Unborn
         N at least 1.
 
     Returns

@@ -22,7 +22,7 @@ from nichechain.domains.memory import cache_memory_of, check_cache_memory, limit
 from nichechain.execution.base import WORKER_DIED, all_failed, evaluate_rows
 from nichechain.execution.growing import Letter, Receiver, Sender, by_parent
 from nichechain.execution.pieces import LOSSES, Piece, Pieces
-from nichechain.variation.brood import Brood
+from nichechain.variation.unborn import Unborn
 
 _AHEAD = 2
 """Pieces with a worker at a time: one under way, and the next, so that it never waits for us."""
@@ -98,7 +98,7 @@ class Workbench:
         assert self._domain is not None
         try:
             if isinstance(rows, Letter):
-                return evaluate_rows(self._domain, self._receiver.brood(rows))
+                return evaluate_rows(self._domain, self._receiver.unborn(rows))
             # A copy, for Ray's arrays are read-only, which a domain need not expect.
             return evaluate_rows(self._domain, rows.copy())
         except Exception as error:
@@ -113,7 +113,7 @@ class Worker(ABC):
     ready : Future
         Done when the worker has the domain.
     sender : Sender
-        What it has been told of broods.
+        What it has been told of unborn children.
     """
 
     ready: Future[Outcome]
@@ -168,7 +168,7 @@ class Fleet(ABC):
     def evaluate(
         self,
         domain: Domain,
-        genotypes: NDArray[np.float32] | Brood,
+        genotypes: NDArray[np.float32] | Unborn,
         on_done: Callable[[int], None] | None = None,
     ) -> Evaluation:
         """Evaluate genotypes (N, P), N at least 1, telling ``on_done`` of every finished piece's size.
@@ -190,7 +190,7 @@ class Fleet(ABC):
                 self._proven = False
             size = self._size()
             back = None
-            if isinstance(genotypes, Brood):
+            if isinstance(genotypes, Unborn):
                 genotypes, back = by_parent(genotypes)
             pieces = Pieces(len(genotypes), domain.chunk, size)
             _Shift(self, domain, pieces, genotypes, on_done).work(size)
@@ -230,7 +230,7 @@ class _Shift:
         fleet: Fleet,
         domain: Domain,
         pieces: Pieces,
-        genotypes: NDArray[np.float32] | Brood,
+        genotypes: NDArray[np.float32] | Unborn,
         on_done: Callable[[int], None] | None,
     ) -> None:
         import cloudpickle
@@ -239,7 +239,7 @@ class _Shift:
         self._domain = domain
         self._pieces = pieces
         self._genotypes = genotypes
-        self._mutate = cloudpickle.dumps(genotypes.mutate) if isinstance(genotypes, Brood) else b""
+        self._mutate = cloudpickle.dumps(genotypes.mutate) if isinstance(genotypes, Unborn) else b""
         self._on_done = on_done
         self._held: dict[Worker, deque[Piece]] = {}
         self._news: SimpleQueue[tuple[Worker, Piece | None, Future[Outcome]]] = SimpleQueue()
@@ -301,7 +301,7 @@ class _Shift:
                 break
             held.append(piece)
             rows = self._genotypes[piece.start : piece.stop]
-            if isinstance(rows, Brood):
+            if isinstance(rows, Unborn):
                 self._watch(worker, piece, worker.submit(worker.sender.letter(rows, self._mutate)))
             else:
                 self._watch(worker, piece, worker.submit(rows))

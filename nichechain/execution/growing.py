@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from nichechain.core.randomness import Purpose
 from nichechain.variation import Mutation
-from nichechain.variation.brood import Brood
+from nichechain.variation.unborn import Unborn
 
 Float32s = NDArray[np.float32]
 Ints = NDArray[np.int64]
@@ -23,7 +23,7 @@ MEMORY = 64 * 2**20
 
 @dataclass(frozen=True)
 class Letter:
-    """Some of a brood, as a worker is told of them.
+    """Some unborn children, as a worker is told of them.
 
     Parameters
     ----------
@@ -60,27 +60,27 @@ class Sender:
         self._held = 0
         self._mutate: bytes | None = None
 
-    def letter(self, brood: Brood, mutate: bytes) -> Letter:
-        """The letter about a brood, whose pickled operator is given."""
+    def letter(self, unborn: Unborn, mutate: bytes) -> Letter:
+        """The letter about unborn children, whose pickled operator is given."""
         forget = self._held > MEMORY
         if forget:
             self._handles.clear()
             self._held = 0
-        rows, which = np.unique(brood.parent, return_inverse=True)
+        rows, which = np.unique(unborn.parent, return_inverse=True)
         handles = np.empty(rows.size, np.int64)
         news: dict[int, tuple[int, Float32s]] = {}
         for i, row in enumerate(rows.tolist()):
             # A parent without a name is held all the same, but never found again.
-            name = object() if brood.names is None else brood.names[row]
+            name = object() if unborn.names is None else unborn.names[row]
             if name not in self._handles:
                 self._handles[name] = next(self._next)
-                genotype = brood.parents[row]
+                genotype = unborn.parents[row]
                 self._held += genotype.nbytes
-                news[self._handles[name]] = (brood.seeds[row], genotype)
+                news[self._handles[name]] = (unborn.seeds[row], genotype)
             handles[i] = self._handles[name]
         known = mutate == self._mutate
         self._mutate = mutate
-        return Letter(forget, news, handles[which], brood.number, brood.purpose, None if known else mutate)
+        return Letter(forget, news, handles[which], unborn.number, unborn.purpose, None if known else mutate)
 
 
 class Receiver:
@@ -90,7 +90,7 @@ class Receiver:
         self._parents: dict[int, tuple[int, Float32s]] = {}
         self._mutate: Mutation | None = None
 
-    def brood(self, letter: Letter) -> Brood:
+    def unborn(self, letter: Letter) -> Unborn:
         """What a letter is about.
 
         Raises
@@ -107,15 +107,15 @@ class Receiver:
         self._parents |= {handle: (seed, one.copy()) for handle, (seed, one) in letter.parents.items()}
         rows, which = np.unique(letter.parent, return_inverse=True)
         seeds, genotypes = zip(*(self._parents[row] for row in rows.tolist()), strict=True)
-        return Brood(self._mutate, letter.purpose, np.stack(genotypes), seeds, which, letter.number)
+        return Unborn(self._mutate, letter.purpose, np.stack(genotypes), seeds, which, letter.number)
 
 
-def by_parent(brood: Brood) -> tuple[Brood, Ints]:
-    """The brood with siblings side by side, and where its rows are then.
+def by_parent(unborn: Unborn) -> tuple[Unborn, Ints]:
+    """Unborn children with siblings side by side, and where its rows are then.
 
     Siblings often move alike, so who evaluates some of them well has them all.
     """
-    order = np.argsort(brood.parent, kind="stable")
+    order = np.argsort(unborn.parent, kind="stable")
     back = np.empty_like(order)
     back[order] = np.arange(order.size)
-    return replace(brood, parent=brood.parent[order], number=brood.number[order]), back
+    return replace(unborn, parent=unborn.parent[order], number=unborn.number[order]), back

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from nichechain.domains.base import Domain, Evaluation
 from nichechain.domains.memory import check_cache_memory, limit_cache
 from nichechain.execution.base import count_workers, evaluate_rows
-from nichechain.variation.brood import Brood
+from nichechain.variation.unborn import Unborn
 
 
 class Threads:
@@ -45,7 +45,7 @@ class Threads:
     def evaluate(
         self,
         domain: Domain,
-        genotypes: NDArray[np.float32] | Brood,
+        genotypes: NDArray[np.float32] | Unborn,
         on_done: Callable[[int], None] | None = None,
     ) -> Evaluation:
         """Evaluate genotypes (N, P), N at least 1, telling ``on_done`` of every finished chunk's size."""

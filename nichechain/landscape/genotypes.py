@@ -16,7 +16,7 @@ from nichechain.domains.base import Domain, Evaluation, check_genotypes
 from nichechain.landscape.behaviors import EPSILON
 from nichechain.landscape.measures import check_sample_size, measure_behaviors
 from nichechain.variation import Mutation
-from nichechain.variation.brood import litters
+from nichechain.variation.unborn import litters
 
 if TYPE_CHECKING:
     from nichechain.execution import Executor

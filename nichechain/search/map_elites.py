@@ -34,7 +34,7 @@ from nichechain.search.lineages import Stretch, UnderWay
 from nichechain.search.savings import Savings
 from nichechain.search.selection import ParentSelection, Told, UniformParents, draw_parents
 from nichechain.variation import Mutation
-from nichechain.variation.brood import Brood
+from nichechain.variation.unborn import Unborn
 
 Ints = NDArray[np.int64]
 
@@ -223,7 +223,7 @@ class MapElites:
 
         uid = self._first_uid(step) + np.arange(batch)
         parent_uid = whose("uid")
-        brood = Brood(
+        unborn = Unborn(
             self._mutate,
             Purpose.MUTATION,
             whose("genotype"),
@@ -233,7 +233,7 @@ class MapElites:
             [(self._number, one) for one in parent_uid.tolist()],
         )
         return Offspring(
-            brood,
+            unborn,
             uid,
             parent_uid[parent],
             whose("niche")[parent],

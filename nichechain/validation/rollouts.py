@@ -18,7 +18,7 @@ from nichechain.core.randomness import Purpose, keyed
 from nichechain.evolvability.niches import answer_for_niches
 from nichechain.evolvability.question import Question
 from nichechain.execution import Executor
-from nichechain.variation.brood import Brood, litters
+from nichechain.variation.unborn import Unborn, litters
 
 Float32s = NDArray[np.float32]
 Ints = NDArray[np.int64]
@@ -164,7 +164,7 @@ def run_lineages(
     elites = np.stack([archive.elite(int(root)).genotype for root in roots])
     mutate, niches = archive.mutate, archive.niches
 
-    def born(children: Brood) -> Ints:
+    def born(children: Unborn) -> Ints:
         evaluation = executor.evaluate(archive.domain, children, on_done)
         state = np.full(len(children), NONE, np.int64)
         fine = ~evaluation.failed
@@ -181,7 +181,7 @@ def run_lineages(
         whose = zip(elite.tolist(), lineage.tolist(), strict=True)
         number = [_birth(int(roots[r]), u, generation) for r, u in whose]
         seeds = (seed,) * len(genotypes)
-        children = Brood(mutate, Purpose.LINEAGE, genotypes, seeds, at, np.array(number, np.int64))
+        children = Unborn(mutate, Purpose.LINEAGE, genotypes, seeds, at, np.array(number, np.int64))
         landed = born(children)
         states[elite, lineage, generation] = landed
         alive = landed != NONE

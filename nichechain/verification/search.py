@@ -23,7 +23,7 @@ from nichechain.search.elites import Elites, SearchState
 from nichechain.search.lineages import Stretch, UnderWay
 from nichechain.search.map_elites import MapElites
 from nichechain.steering import make_contests, make_selection
-from nichechain.variation.brood import Brood
+from nichechain.variation.unborn import Unborn
 from nichechain.verification.record import Births, Bools, Run, differs, largest_difference
 from nichechain.verification.result import SEARCH, Check
 
@@ -229,7 +229,7 @@ class _Record:
     def evaluate(
         self,
         domain: Domain,  # noqa: ARG002
-        genotypes: NDArray[np.float32] | Brood,
+        genotypes: NDArray[np.float32] | Unborn,
         on_done: Callable[[int], None] | None = None,
     ) -> Evaluation:
         """What became of the next births."""

@@ -23,7 +23,7 @@ from nichechain.execution import Executor, evaluate_rows
 from nichechain.landscape import niches_of, population_evolvability
 from nichechain.niches import Niches
 from nichechain.variation import Mutation
-from nichechain.variation.brood import Brood
+from nichechain.variation.unborn import Unborn
 from nichechain.walks.config import WalkConfig, run_seed
 from nichechain.walks.diversity import NoveltyArchive, Surroundings
 from nichechain.walks.litters import Litters, Scored
@@ -219,7 +219,7 @@ class Walks:
                 each=config.metric.litter,
                 step=state.step + 1,
                 niches=self._niches,
-                evaluate=lambda brood: self._evaluate(brood, executor, on_done),
+                evaluate=lambda unborn: self._evaluate(unborn, executor, on_done),
             )
             around = replace(around, litters=judging.landed, niches=len(self._niches))
         score = config.metric(behavior, self._lineage, self._itself, around)
@@ -256,7 +256,7 @@ class Walks:
 
     def _evaluate(
         self,
-        genotypes: NDArray[np.float32] | Brood,
+        genotypes: NDArray[np.float32] | Unborn,
         executor: Executor | None,
         on_done: Callable[[int], None] | None = None,
     ) -> Evaluation:
@@ -270,7 +270,7 @@ class Walks:
         walks, width = state.uid.shape
         first = self._first_uid(state)
         uid = first + np.arange(width * each)
-        brood = Brood(
+        unborn = Unborn(
             self._mutate,
             Purpose.MUTATION,
             state.genotype.reshape(walks * width, -1),
@@ -279,7 +279,7 @@ class Walks:
             np.tile(uid, walks),
         )
         return Offspring(
-            brood,
+            unborn,
             np.tile(uid, walks),
             np.repeat(state.uid.ravel(), each),
             np.repeat(state.niche.ravel(), each),

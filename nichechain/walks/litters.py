@@ -16,7 +16,7 @@ from nichechain.domains.base import Evaluation
 from nichechain.landscape import niches_of
 from nichechain.niches import Niches
 from nichechain.variation import Mutation
-from nichechain.variation.brood import Brood
+from nichechain.variation.unborn import Unborn
 
 Ints = NDArray[np.int64]
 
@@ -64,7 +64,7 @@ class Litters:
         each: int,
         step: int,
         niches: Niches,
-        evaluate: Callable[[Brood], Evaluation],
+        evaluate: Callable[[Unborn], Evaluation],
     ) -> Litters:
         """Make and evaluate them.
 
@@ -88,7 +88,7 @@ class Litters:
         # Whoever failed has no offspring.
         place = place[scored.niche.ravel()[place // each] != NONE]
         parent, uid = place // each, first + place % (count * each)
-        brood = Brood(
+        unborn = Unborn(
             mutate,
             Purpose.MUTATION,
             scored.genotype.reshape(walks * count, -1),
@@ -96,10 +96,10 @@ class Litters:
             parent,
             uid,
         )
-        evaluation = evaluate(brood)
+        evaluation = evaluate(unborn)
         landed = niches_of(evaluation, niches)
         offspring = Offspring(
-            brood,
+            unborn,
             uid,
             scored.uid.ravel()[parent],
             scored.niche.ravel()[parent],

@@ -14,7 +14,7 @@ from nichechain.core.errors import NichechainError
 from nichechain.core.randomness import Purpose
 from nichechain.execution import Threads, fleet
 from nichechain.execution.fleet import Fleet, Outcome, Rows, Workbench, Worker
-from nichechain.variation.brood import Brood
+from nichechain.variation.unborn import Unborn
 
 from .samples import Arm, assert_same, numbered
 
@@ -111,9 +111,9 @@ def test_lost_workers_change_nothing(seed: int, monkeypatch: pytest.MonkeyPatch)
     assert sum(done) == 400
 
 
-def brood(n: int, seed: int, mutate: variation.Mutation) -> Brood:
+def unborn(n: int, seed: int, mutate: variation.Mutation) -> Unborn:
     rng = np.random.default_rng(seed)
-    return Brood(
+    return Unborn(
         mutate,
         Purpose.MUTATION,
         numbered(9)[rng.permutation(9)],
@@ -129,7 +129,7 @@ def test_workers_grow_children_to_the_bit(mortality: float, monkeypatch: pytest.
     domain = Arm()
     with FakeFleet(3, mortality) as executor:
         for number, scale in enumerate([1.0, 1.0, 0.1, 1.0]):
-            children = brood(200, number, variation.cauchy(scale))
+            children = unborn(200, number, variation.cauchy(scale))
             done: list[int] = []
             found = executor.evaluate(domain, children, done.append)
             assert_same(found, Arm().evaluate(children.grow()))
@@ -142,9 +142,9 @@ def test_a_mutation_that_raises_is_not_the_genotypes_doing() -> None:
         raise ArithmeticError("no such step")
 
     with FakeFleet(2) as executor, pytest.raises(ArithmeticError, match="no such step"):
-        executor.evaluate(Arm(), brood(20, 0, broken))
+        executor.evaluate(Arm(), unborn(20, 0, broken))
     with Threads(2) as threads, pytest.raises(ArithmeticError, match="no such step"):
-        threads.evaluate(Arm(), brood(20, 0, broken))
+        threads.evaluate(Arm(), unborn(20, 0, broken))
 
 
 @pytest.mark.parametrize("size", [1, 2, 5])

@@ -19,7 +19,7 @@ from nichechain.search.parents import CuriousParents
 from nichechain.search.selection import Told
 from nichechain.steering.online import OnlineChain
 from nichechain.steering.reach import many_lineages
-from nichechain.variation.brood import litters
+from nichechain.variation.unborn import litters
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -157,9 +157,9 @@ def _offspring_niches(
     chosen = rng.choice(occupied, size=min(elites, occupied.size), replace=False)
     if not chosen.size:
         return float("nan")
-    brood = litters(archive.mutate, Purpose.OFFSPRING, archive.elites.genotype[chosen], seed, offspring)
-    evaluation = executor.evaluate(archive.domain, brood, on_done)
-    landed = np.full(len(brood), NONE, np.int64)
+    unborn = litters(archive.mutate, Purpose.OFFSPRING, archive.elites.genotype[chosen], seed, offspring)
+    evaluation = executor.evaluate(archive.domain, unborn, on_done)
+    landed = np.full(len(unborn), NONE, np.int64)
     landed[~evaluation.failed] = niches.of(evaluation.behavior[~evaluation.failed])
     found = []
     for row in landed.reshape(chosen.size, offspring):

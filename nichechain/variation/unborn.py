@@ -21,7 +21,7 @@ Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
-class Brood:
+class Unborn:
     """N children of K parents, not grown yet.
 
     Parameters
@@ -38,7 +38,7 @@ class Brood:
         Number of each child among those of its seed and purpose.
     names : sequence of hashable, optional
         One for each parent, which no other genotype has while this process lives: who evaluates
-        may then keep the parent for the next brood.
+        may then keep the parent for the next children.
     """
 
     mutate: Mutation
@@ -53,7 +53,7 @@ class Brood:
         """Number of children."""
         return len(self.number)
 
-    def __getitem__(self, rows: slice | NDArray[np.bool_] | Ints) -> Brood:
+    def __getitem__(self, rows: slice | NDArray[np.bool_] | Ints) -> Unborn:
         """Some of the children; the parents stay."""
         return replace(self, parent=self.parent[rows], number=self.number[rows])
 
@@ -73,16 +73,16 @@ class Brood:
         return children
 
 
-def litters(mutate: Mutation, purpose: Purpose, parents: Float32s, seed: int, size: int) -> Brood:
+def litters(mutate: Mutation, purpose: Purpose, parents: Float32s, seed: int, size: int) -> Unborn:
     """So many children of every parent (K, P), those of the first parent first.
 
     The i-th child of every parent is made with the same noise.
     """
     count = len(parents)
     each = np.repeat(np.arange(count), size)
-    return Brood(mutate, purpose, parents, (seed,) * count, each, np.tile(np.arange(size), count))
+    return Unborn(mutate, purpose, parents, (seed,) * count, each, np.tile(np.arange(size), count))
 
 
-def grown(genotypes: Float32s | Brood) -> Float32s:
+def grown(genotypes: Float32s | Unborn) -> Float32s:
     """Genotypes as an array, (N, P)."""
-    return genotypes.grow() if isinstance(genotypes, Brood) else genotypes
+    return genotypes.grow() if isinstance(genotypes, Unborn) else genotypes

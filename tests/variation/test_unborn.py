@@ -7,7 +7,7 @@ import pytest
 
 from nichechain import variation
 from nichechain.core.randomness import Purpose, keyed
-from nichechain.variation.brood import Brood, grown, litters
+from nichechain.variation.unborn import Unborn, grown, litters
 
 PARENTS = np.random.default_rng(0).normal(size=(3, 7)).astype(np.float32)
 SEEDS = (5, 2**80, 6)
@@ -16,8 +16,8 @@ NUMBERS = np.array([0, 9, 2**33, 4, 0, 2**62])
 
 
 @pytest.fixture
-def brood() -> Brood:
-    return Brood(variation.cauchy(), Purpose.MUTATION, PARENTS, SEEDS, ROWS, NUMBERS)
+def unborn() -> Unborn:
+    return Unborn(variation.cauchy(), Purpose.MUTATION, PARENTS, SEEDS, ROWS, NUMBERS)
 
 
 def expected() -> np.ndarray:
@@ -30,23 +30,23 @@ def expected() -> np.ndarray:
     )
 
 
-def test_a_child_is_a_function_of_its_parent_its_seed_and_its_number(brood: Brood) -> None:
-    assert len(brood) == 6
-    assert brood.grow().dtype == np.float32
-    np.testing.assert_array_equal(brood.grow(), expected())
-    np.testing.assert_array_equal(np.asarray(brood), expected())
-    np.testing.assert_array_equal(grown(brood), expected())
-    assert np.asarray(brood, np.float64).dtype == np.float64
+def test_a_child_is_a_function_of_its_parent_its_seed_and_its_number(unborn: Unborn) -> None:
+    assert len(unborn) == 6
+    assert unborn.grow().dtype == np.float32
+    np.testing.assert_array_equal(unborn.grow(), expected())
+    np.testing.assert_array_equal(np.asarray(unborn), expected())
+    np.testing.assert_array_equal(grown(unborn), expected())
+    assert np.asarray(unborn, np.float64).dtype == np.float64
 
 
 @pytest.mark.parametrize("rows", [slice(1, 4), np.array([5, 0]), np.arange(6) % 2 == 0, slice(0, 0)])
-def test_some_of_a_brood_are_the_same_children(brood: Brood, rows: slice | np.ndarray) -> None:
-    np.testing.assert_array_equal(brood[rows].grow(), expected()[rows])
+def test_some_of_the_unborn_are_the_same_children(unborn: Unborn, rows: slice | np.ndarray) -> None:
+    np.testing.assert_array_equal(unborn[rows].grow(), expected()[rows])
 
 
 def test_siblings_of_litters_share_their_noise() -> None:
-    brood = litters(variation.gaussian(), Purpose.OFFSPRING, PARENTS, 4, 5)
-    steps = brood.grow().reshape(3, 5, 7) - PARENTS[:, None]
+    unborn = litters(variation.gaussian(), Purpose.OFFSPRING, PARENTS, 4, 5)
+    steps = unborn.grow().reshape(3, 5, 7) - PARENTS[:, None]
     for i in range(5):
         noise = keyed(4, Purpose.OFFSPRING, i).standard_normal(7)
         np.testing.assert_allclose(steps[:, i], np.broadcast_to(noise, (3, 7)), atol=1e-6)
@@ -62,6 +62,6 @@ def test_no_operator_changes_a_parent_that_siblings_share() -> None:
         parent += rng.standard_normal(parent.size).astype(np.float32)
         return parent
 
-    brood = Brood(careless, Purpose.MUTATION, PARENTS.copy(), SEEDS, ROWS, NUMBERS)
+    unborn = Unborn(careless, Purpose.MUTATION, PARENTS.copy(), SEEDS, ROWS, NUMBERS)
     with pytest.raises(ValueError, match="read-only"):
-        brood.grow()
+        unborn.grow()
