@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 from nichechain import variation
@@ -29,6 +28,7 @@ from nichechain.search.elites import Elites
 from nichechain.search.making import make_domain, make_mutation
 
 if TYPE_CHECKING:
+    import pandas as pd
     import pyarrow as pa
     from torch import nn
 
@@ -370,6 +370,7 @@ def _shipped_roots() -> tuple[Path, Path]:
 
 def _nullable(kind: Any) -> Any:
     """Pandas types that keep integers whole beside nulls."""
+    import pandas as pd
     import pyarrow as pa
 
     return {

@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 
 from nichechain.births.joins import across_runs, parent_rows
 from nichechain.births.table import NONE, check_columns
@@ -22,6 +21,7 @@ from nichechain.niches import Niches
 
 if TYPE_CHECKING:
     import networkx as nx
+    import pandas as pd
 
 # Points, of which 72 are an inch.
 _DOT_SPAN = 720.0
@@ -168,6 +168,8 @@ def write_phylogeny(births: pd.DataFrame, niches: Niches, path: str | Path) -> N
     ``failed`` for none), ``run``, ``uid``, ``depth`` and ``objective``. Ids are uids, those of
     later runs being counted on from those of earlier ones.
     """
+    import pandas as pd
+
     check_columns(births, "run", "uid", "parent_uid", "step", "child_niche", "depth", "objective")
     number, parents = _numbered(births)
     rows = (

@@ -114,17 +114,17 @@ class GridDisplacement:
 
     def sample(self, parent: Ints, rng: np.random.Generator) -> Ints:
         """A niche in bounds for a child of each parent (N,), which are niches."""
+        from nichechain.chain import displacement_steps
+
         child = np.empty(parent.size, np.int64)
         shape = np.array(self.niches.shape)
         open_ = np.arange(parent.size)
         # Drawing again whatever lands off the grid conditions the kernel on staying in it.
         while open_.size:
-            cells = np.stack(np.unravel_index(parent[open_], self.niches.shape), axis=1)
             moves = self._moves.draw(np.zeros(open_.size, np.int64), rng)
-            step = np.stack(np.unravel_index(moves, self.kernel.shape), axis=1) - (shape - 1)
-            landed = cells + step
-            stays = ((landed >= 0) & (landed < shape)).all(axis=1)
-            child[open_[stays]] = np.ravel_multi_index(tuple(landed[stays].T), self.niches.shape)
+            landed = displacement_steps.landed(parent[open_], moves, shape)
+            stays = landed >= 0
+            child[open_[stays]] = landed[stays]
             open_ = open_[~stays]
         return child
 

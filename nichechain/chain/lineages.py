@@ -15,10 +15,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
-from scipy.optimize import minimize_scalar
 
 from nichechain.chain.operator import PooledTransition
+from nichechain.chain.small_urns import MOST_STATES, MOST_VISITS, SmallUrns, WholeRows
 from nichechain.chain.urns import UrnRows, Urns
+from nichechain.core.minimum import minimum
 from nichechain.core.randomness import Purpose, keyed
 
 if TYPE_CHECKING:
@@ -45,6 +46,8 @@ _USUAL = 2.0
 _IMAGINARY = 20.0
 _LEAST_DEVIATION = 0.5
 _TINY = 1e-300
+# Three quarters of a drawn row of 400 states are smaller, and hold less than 1e-4 of it together.
+_SPECK = 1e-7
 
 
 @dataclass(frozen=True)
@@ -140,19 +143,17 @@ def fitted_law(posterior: DirichletPosterior) -> LineageLaw | None:
     first = rows.scattered(posterior.elite_concentration)
     later = rows.with_stay(_base_stay(posterior), stay)
     rng = keyed(0, Purpose.LINEAGE_LAW)
-    off, known = [], []
-    for log_concentration in _LOG_CONCENTRATIONS:
-        urns = Urns(posterior, first, later.scattered(float(np.exp(log_concentration))))
-        difference = broods.simulated(urns, rng).mean(axis=1) - broods.reached
-        spread = difference.std(ddof=1) if difference.size > 1 else 0.0
-        off.append(difference.mean())
-        least = max(_LEAST_SPREAD * broods.reached.mean(), _LEAST_DEVIATION)
-        known.append(max(spread, least) / np.sqrt(difference.size))
+    kinds = [later.scattered(float(concentration)) for concentration in np.exp(_LOG_CONCENTRATIONS)]
+    difference = broods.simulated(posterior, first, kinds, rng).mean(axis=2) - broods.reached
+    off = difference.mean(axis=1)
+    spread = difference.std(axis=1, ddof=1) if broods.reached.size > 1 else np.zeros(len(kinds))
+    least = max(_LEAST_SPREAD * broods.reached.mean(), _LEAST_DEVIATION)
+    known = np.maximum(spread, least) / np.sqrt(broods.reached.size)
     fine = np.linspace(_LOG_CONCENTRATIONS[0], _LOG_CONCENTRATIONS[-1], _FINE)
     miss = np.interp(fine, _LOG_CONCENTRATIONS, off) / np.interp(fine, _LOG_CONCENTRATIONS, known)
     likely = np.exp(-0.5 * (miss**2 + ((fine - _EXPECTED) / _SPREAD) ** 2))
     law = LineageLaw(stay, error, fine, likely / likely.sum(), 1.0, broods.reached.size, len(table))
-    found = broods.simulated(Urns(posterior, first, later.scattered(law.concentration)), rng)
+    (found,) = broods.simulated(posterior, first, [later.scattered(law.concentration)], rng)
     distance = (broods.reached - found.mean(axis=1)) / np.maximum(found.std(axis=1, ddof=1), _LEAST_DEVIATION)
     ratio = np.sqrt(((distance**2).sum() + _IMAGINARY * _USUAL) / (distance.size - 1 + _IMAGINARY))
     return replace(law, spread=max(1.0, float(ratio)))
@@ -194,7 +195,7 @@ def _stay(posterior: DirichletPosterior, table: Ints) -> tuple[float, float]:
         prior = 0.5 * (b / _STAY_SPREAD) ** 2
         return float(np.logaddexp(0.0, logit).sum() - logit[stayed].sum() + prior)
 
-    best = float(minimize_scalar(surprise, bounds=(-6.0, 6.0), method="bounded").x)
+    best = minimum(surprise, -6.0, 6.0)
     p = 1.0 / (1.0 + np.exp(-(odds + best)))
     return best, float(1.0 / np.sqrt((p * (1.0 - p)).sum() + _STAY_SPREAD**-2))
 
@@ -226,25 +227,52 @@ class _Broods:
         reached = np.unique(np.stack([brood[inside], table[inside, 4]]), axis=1)
         self.reached: Floats = np.bincount(reached[0], minlength=self._size.size).astype(np.float64)
 
-    def simulated(self, urns: Urns, rng: np.random.Generator) -> Floats:
-        """Niches that such broods reach, (B, repeats)."""
-        found = np.zeros((self._size.size, _REPEATS))
-        longest = self._present.shape[1]
+    def simulated(
+        self, posterior: DirichletPosterior, first: UrnRows, later: list[UrnRows], rng: np.random.Generator
+    ) -> Floats:
+        """Niches that such broods reach when their later rows are each of some, (K, B, repeats)."""
+        kinds, generations = len(later), self._present.shape[1]
+        found = np.zeros((kinds, self._size.size, _REPEATS))
         for size in np.unique(self._size):
             these = np.flatnonzero(self._size == size)
-            root = np.repeat(self._root[these], _REPEATS * size).reshape(-1, size)
-            states = urns.walks(root, longest, rng, roots=True)[:, size:]
+            root = np.tile(np.repeat(self._root[these], _REPEATS * size).reshape(-1, size), (kinds, 1))
+            states = _walks(posterior, first, later, root, generations, rng)[:, size:]
             kept = np.repeat(self._present[these][:, :, :size].reshape(these.size, -1), _REPEATS, axis=0)
-            states = np.where(kept & (states < self._niches), states, -1)
+            states = np.where(np.tile(kept, (kinds, 1)) & (states < self._niches), states, -1)
             states.sort(axis=1)
             new = (states[:, 1:] != states[:, :-1]).sum(axis=1) + (states[:, 0] >= 0)
-            found[these] = new.reshape(these.size, _REPEATS)
+            found[:, these] = new.reshape(kinds, these.size, _REPEATS)
         return found
 
 
+def _walks(
+    posterior: DirichletPosterior,
+    first: UrnRows,
+    later: list[UrnRows],
+    roots: Ints,
+    generations: int,
+    rng: np.random.Generator,
+) -> Ints:
+    """States of lineages of roots (g, M), equally many with each of the later rows: (g, (l + 1) M)."""
+    states = first.strength.size
+    if states <= MOST_STATES and roots.shape[1] * (generations + 1) <= MOST_VISITS:
+        base = posterior.base.rows(np.arange(states))
+        begins, goes_on = (
+            WholeRows.of(rows, base, absorbing=posterior.absorbing) for rows in (first, later[0])
+        )
+        return SmallUrns(begins, goes_on.worth(later)).walks(roots, generations, rng)
+    walks = [
+        Urns(posterior, first, rows).walks(some, generations, rng, roots=True)
+        for rows, some in zip(later, np.split(roots, len(later)), strict=True)
+    ]
+    return np.concatenate(walks)
+
+
 def scattered_rows(rows: Floats, concentration: float, rng: np.random.Generator) -> Floats:
-    """Distributions drawn around some, Dirichlet(τ p), (..., S)."""
-    weight = rng.standard_gamma(concentration * rows)
+    """Distributions drawn around some, Dirichlet(τ p), (..., S): what holds next to nothing gets nothing."""
+    weight = np.zeros_like(rows)
+    kept = rows > _SPECK
+    weight[kept] = rng.standard_gamma(concentration * rows[kept])
     total = weight.sum(axis=-1, keepdims=True)
     drawn: Floats = np.where(total > _TINY, weight / np.maximum(total, _TINY), rows)
     return drawn

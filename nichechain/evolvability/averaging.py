@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable
 from typing import TypeAlias
 
 import numpy as np
@@ -15,8 +15,9 @@ from nichechain.core.intervals import drawn_interval, no_interval
 from nichechain.core.randomness import Purpose, keyed
 from nichechain.evolvability.coverage import at_least_once, expected_coverage, sampled_coverage
 from nichechain.evolvability.question import MOST_EXACT, Question
-from nichechain.evolvability.reach import visit_probability
+from nichechain.evolvability.reach import MOST_POWERS, visit_probability
 from nichechain.evolvability.results import Evolvability
+from nichechain.execution.side_by_side import side_by_side
 
 Floats = NDArray[np.float64]
 Sample: TypeAlias = tuple[Transition, Floats]
@@ -29,33 +30,39 @@ _SPARSE, _FEW_STEPS = 0.02, 100
 
 
 def one_root(
-    chain: NicheChain, samples: Iterator[Sample], question: Question, repeats: int, own: int | None = None
+    chain: NicheChain,
+    sample: Callable[[int], Sample],
+    samples: int,
+    question: Question,
+    repeats: int,
+    own: int | None = None,
+    on_done: Callable[[int], None] | None = None,
 ) -> Evolvability:
     """Evolvability of one root over samples of T and of generation 1, (S,), and of where it stands itself."""
     n, steps = chain.n_niches, question.drawn_steps(own)
     stands = None if own is None else np.array([own])
-    means, errors, saturated = [], [], False
-    for number, (matrix, first) in enumerate(samples):
-        if question.method != "monte-carlo":
-            if own is None and _is_sparse(matrix) and steps <= _FEW_STEPS:
-                # From one root few states are seen: cost follows them, not all that there are.
-                visit, _ = visit_probability(matrix, first, steps)
-                some = at_least_once(visit[:n], [question.lineages, ENDLESS])
-                covered, endless = (float(each.sum()) for each in some)
-            else:
-                covered, endless = expected_coverage(
-                    matrix, first[None, :], steps, [question.lineages, ENDLESS], counted=n, own=stands
-                )[0]
-            saturated |= bool(covered > SATURATED * endless)
-            means.append(covered)
-            errors.append(0.0)
-        else:
+
+    def on_sample(number: int) -> tuple[float, float, bool]:
+        matrix, first = sample(number)
+        if question.method == "monte-carlo":
             rng = keyed(question.seed, Purpose.WALKS, number)
             sampled = sampled_coverage(
                 matrix, first, steps, question.lineages, repeats, rng, counted=n, own=own
             )
-            means.append(sampled.mean())
-            errors.append(standard_error(sampled))
+            return float(sampled.mean()), standard_error(sampled), False
+        if own is None and _is_quick(matrix, steps):
+            visit, _ = visit_probability(matrix, first, steps)
+            some = at_least_once(visit[:n], [question.lineages, ENDLESS])
+            covered, endless = (float(each.sum()) for each in some)
+        else:
+            covered, endless = expected_coverage(
+                matrix, first[None, :], steps, [question.lineages, ENDLESS], counted=n, own=stands
+            )[0]
+        return float(covered), 0.0, bool(covered > SATURATED * endless)
+
+    found = side_by_side(on_sample, range(samples), on_done)
+    means, errors, full = zip(*found, strict=True)
+    saturated = any(full)
     figures = summary(np.array(means), np.array(errors), spread_of(chain), n)
     value, error, low, high = (float(x) for x in figures)
     return Evolvability(
@@ -73,11 +80,16 @@ def one_root(
     )
 
 
-def _is_sparse(matrix: Transition) -> bool:
-    """Whether T is a sparse matrix of many states, each of which leads to few."""
+def _is_quick(matrix: Transition, steps: int) -> bool:
+    """Whether one root is followed with fewer operations than all are.
+
+    In a sparse T of many states cost follows those that are seen; in a whole one half the products suffice.
+    """
+    if isinstance(matrix, np.ndarray):
+        return steps <= MOST_POWERS
     if not isinstance(matrix, sparse.csr_array) or matrix.shape[0] <= MOST_EXACT:
         return False
-    return bool(matrix.nnz <= _SPARSE * matrix.shape[0] ** 2)
+    return steps <= _FEW_STEPS and bool(matrix.nnz <= _SPARSE * matrix.shape[0] ** 2)
 
 
 def standard_error(sampled: NDArray[np.int64]) -> float:

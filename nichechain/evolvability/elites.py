@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 from scipy import sparse
 
@@ -21,6 +20,8 @@ from nichechain.evolvability.question import DRAWS, Convention, Question, dense
 from nichechain.evolvability.record import draw_known, own_strength, recorded_children
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from nichechain.archive.archive import Archive
 
 Floats = NDArray[np.float64]
@@ -70,6 +71,8 @@ def elite_evolvability(
     What :func:`nichechain.genotype_evolvability` says of each with ``offspring=0``, in closed form, from
     the same draws of T but other draws of D. Probabilities of visits are computed once for all elites.
     """
+    import pandas as pd
+
     question = Question(l, lineages, convention, draws=draws, seed=seed)
     if strength is not None:
         check_positive(strength=strength)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING, Literal, get_args
 
@@ -123,16 +123,17 @@ def genotype_evolvability(
     root = Root(chain, niche=elite.state)
     strength = own_strength(chain) if strength is None else strength
 
-    def samples() -> Iterator[Sample]:
-        # Where T is given, D is not, if it has to be guessed.
-        for number, drawn in enumerate(question.samples(chain, redraw=guessed, on_done=on_done)):
-            if guessed:
-                rng = keyed(seed, Purpose.FIRST_GENERATION, number)
-                yield drawn.onward, draw_children(counts, root.children(drawn), rng, strength)
-            else:
-                yield drawn.onward, counts / observed
+    def sample(number: int) -> Sample:
+        drawn = question.sample(chain, number)
+        if not guessed:
+            return drawn.onward, counts / observed
+        rng = keyed(seed, Purpose.FIRST_GENERATION, number)
+        return drawn.onward, draw_children(counts, root.children(drawn), rng, strength)
 
-    result = one_root(chain, samples(), question, question.repeats_of_each(chain, redraw=guessed))
+    # Where T is given, D is not, if it has to be guessed.
+    size = question.number_of_samples(chain, redraw=guessed)
+    repeats_of_each = question.repeats_of_each(chain, redraw=guessed)
+    result = one_root(chain, sample, size, question, repeats_of_each, on_done=on_done)
     result = replace(result, births=root.births, recorded=recorded, offspring=observed - recorded)
     if guessed and question.steps == 1 and not recorded and lineages <= observed:
         # No distribution has to be guessed: these are children, and there are enough of them.

@@ -13,6 +13,7 @@ from nichechain.core.randomness import Purpose, keyed
 from nichechain.evolvability.averaging import (
     ENDLESS,
     SATURATED,
+    Sample,
     one_root,
     spread_of,
     standard_error,
@@ -23,6 +24,7 @@ from nichechain.evolvability.coverage import expected_coverage, sampled_coverage
 from nichechain.evolvability.question import DRAWS, Convention, Method, Question, Root, dense
 from nichechain.evolvability.results import Evolvability, NicheEvolvability
 from nichechain.evolvability.urns import simulated_coverage
+from nichechain.execution.side_by_side import side_by_side
 from nichechain.niches import Niche
 
 Floats = NDArray[np.float64]
@@ -106,8 +108,13 @@ def answer(
     if question.by_urns(chain):
         return replace(_one_by_urns(chain, root, question), births=root.births)
     own = root.visited(question)
-    samples = ((drawn.onward, root.children(drawn)) for drawn in question.samples(chain, on_done=on_done))
-    result = one_root(chain, samples, question, question.repeats_of_each(chain), own)
+
+    def sample(number: int) -> Sample:
+        drawn = question.sample(chain, number)
+        return drawn.onward, root.children(drawn)
+
+    size = question.number_of_samples(chain)
+    result = one_root(chain, sample, size, question, question.repeats_of_each(chain), own, on_done)
     return replace(result, births=root.births)
 
 
@@ -166,36 +173,43 @@ def answer_for_niches(
         return _by_urns(chain, question, asked, tell)
     size = question.repeats_of_each(chain)
     own = asked if question.root_counts else None
-    means, errors, saturated = [], [], False
-    for number, drawn in enumerate(question.samples(chain)):
+
+    def on_draw(number: int) -> tuple[Floats, Floats, bool]:
+        drawn = question.sample(chain, number)
         first = drawn.children(asked)
         if question.method != "monte-carlo":
             covered = expected_coverage(
                 drawn.onward, first, question.l, [lineages, ENDLESS], counted=n, own=own
             )
             share = covered[:, 0] / np.maximum(covered[:, 1], 1e-300)
-            saturated |= bool(np.median(share) > SATURATED)
-            means.append(covered[:, 0])
-            errors.append(np.zeros(asked.size))
-        else:
-            rng = keyed(question.seed, Purpose.WALKS, number)
-            sampled = [
-                sampled_coverage(
-                    drawn.onward,
-                    start,
-                    question.l,
-                    lineages,
-                    size,
-                    rng,
-                    counted=n,
-                    own=int(niche) if question.root_counts else None,
-                )
-                for niche, start in zip(asked, dense(first), strict=True)
-            ]
-            means.append(np.mean(sampled, axis=1))
-            errors.append(np.array([standard_error(walks) for walks in sampled]))
+            return covered[:, 0], np.zeros(asked.size), bool(np.median(share) > SATURATED)
+        rng = keyed(question.seed, Purpose.WALKS, number)
+        sampled = [
+            sampled_coverage(
+                drawn.onward,
+                start,
+                question.l,
+                lineages,
+                size,
+                rng,
+                counted=n,
+                own=int(niche) if question.root_counts else None,
+            )
+            for niche, start in zip(asked, dense(first), strict=True)
+        ]
+        return np.mean(sampled, axis=1), np.array([standard_error(walks) for walks in sampled]), False
+
+    done = 0
+
+    def count(more: int) -> None:
+        nonlocal done
+        done += more
         if tell is not None:
-            tell(number + 1)
+            tell(done)
+
+    found = side_by_side(on_draw, range(question.number_of_samples(chain)), count)
+    means, errors, full = zip(*found, strict=True)
+    saturated = any(full)
     figures = summary(np.array(means), np.array(errors), spread_of(chain), n)
     method = "exact" if question.method == "auto" else question.method
     return _of_all(chain, question, asked, figures, method, saturated)

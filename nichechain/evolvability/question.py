@@ -31,6 +31,9 @@ DRAWS = 50
 MOST_EXACT = 1_000
 """States up to which l-evolvability of an estimated chain is computed in closed form by default."""
 
+# States whose elites' rows are drawn together: few generators, and little in vain for a single root.
+_TOGETHER = 16
+
 # Seconds of which whoever asks is told before, and what a processor does in one of them.
 _LONG = 600.0
 _MOVES_A_SECOND, _SUMS_A_SECOND = 4e6, 2e10
@@ -64,17 +67,21 @@ class DrawnChain:
     def children(self, states: Ints) -> Transition:
         """Distributions of generation 1 of elites in some states, (m, S).
 
-        That of a state is drawn from ``keyed(seed, Purpose.ELITE_ROW, number * S + state)``, whatever other
-        states are asked for.
+        Those of 16 states that follow one another are drawn together, from
+        ``keyed(seed, Purpose.ELITE_ROW, number * blocks + block)``, whatever states are asked for.
         """
-        some: Transition = self.rows[states]
         if self.concentration is None:
+            some: Transition = self.rows[states]
             return some
-        own = dense(some).copy()
-        first = self.number * self.rows.shape[0]
-        for place, state in enumerate(states.tolist()):
-            rng = keyed(self.seed, Purpose.ELITE_ROW, first + state)
-            own[place] = scattered_rows(own[place], self.concentration, rng)
+        size = self.rows.shape[0]
+        blocks = -(-size // _TOGETHER)
+        own = np.empty((states.size, size))
+        for block in np.unique(states // _TOGETHER).tolist():
+            members = np.arange(block * _TOGETHER, min((block + 1) * _TOGETHER, size))
+            rng = keyed(self.seed, Purpose.ELITE_ROW, self.number * blocks + block)
+            drawn = scattered_rows(dense(self.rows[members]), self.concentration, rng)
+            here = states // _TOGETHER == block
+            own[here] = drawn[states[here] - members[0]]
         return own
 
 
@@ -153,7 +160,7 @@ class Question:
         roots : int
             Roots that are asked for.
         """
-        samples = self._samples(chain, False)
+        samples = self.number_of_samples(chain)
         if self.method == "monte-carlo":
             moves = float(roots) * max(samples, self.repeats) * self.lineages * self.steps
             cost = moves / _MOVES_A_SECOND
@@ -187,11 +194,14 @@ class Question:
         (S, S) array, scipy.sparse.csr_array or PooledTransition
             Draw k comes from ``keyed(seed, Purpose.POSTERIOR, k)``.
         """
-        for number in range(self._samples(chain, redraw)):
-            if chain.posterior is None:
-                yield chain.operator
-            else:
-                yield chain.posterior.draw(keyed(self.seed, Purpose.POSTERIOR, number))
+        for number in range(self.number_of_samples(chain, redraw=redraw)):
+            yield self.transition(chain, number)
+
+    def transition(self, chain: NicheChain, number: int) -> Transition:
+        """Draw k of :meth:`transitions`."""
+        if chain.posterior is None:
+            return chain.operator
+        return chain.posterior.draw(keyed(self.seed, Purpose.POSTERIOR, number))
 
     def samples(
         self,
@@ -214,23 +224,29 @@ class Question:
         DrawnChain
             What it adds to draw k comes from ``keyed(seed, Purpose.LINEAGE_LAW, k)``.
         """
-        law = None if chain.posterior is None else chain.posterior.law
-        for number, transition in enumerate(self.transitions(chain, redraw=redraw)):
-            if law is None:
-                yield DrawnChain(transition, transition, None, self.seed, number)
-            else:
-                assert chain.posterior is not None
-                onward = law.onward(transition, keyed(self.seed, Purpose.LINEAGE_LAW, number))
-                concentration = chain.posterior.elite_concentration
-                yield DrawnChain(transition, onward, concentration, self.seed, number)
+        for number in range(self.number_of_samples(chain, redraw=redraw)):
+            yield self.sample(chain, number)
             if on_done is not None:
                 on_done(1)
 
+    def sample(self, chain: NicheChain, number: int) -> DrawnChain:
+        """Draw k of :meth:`samples`."""
+        transition = self.transition(chain, number)
+        law = None if chain.posterior is None else chain.posterior.law
+        if law is None:
+            return DrawnChain(transition, transition, None, self.seed, number)
+        assert chain.posterior is not None
+        if isinstance(transition, sparse.csr_array) and transition.nnz == chain.states**2:
+            transition = transition.toarray()
+        onward = law.onward(transition, keyed(self.seed, Purpose.LINEAGE_LAW, number))
+        return DrawnChain(transition, onward, chain.posterior.elite_concentration, self.seed, number)
+
     def repeats_of_each(self, chain: NicheChain, *, redraw: bool = False) -> int:
         """Simulations on each of :meth:`transitions`, so that all have as many as asked for."""
-        return math.ceil(self.repeats / self._samples(chain, redraw))
+        return math.ceil(self.repeats / self.number_of_samples(chain, redraw=redraw))
 
-    def _samples(self, chain: NicheChain, redraw: bool) -> int:
+    def number_of_samples(self, chain: NicheChain, *, redraw: bool = False) -> int:
+        """How many there are of :meth:`transitions`."""
         return self.draws if redraw or chain.posterior is not None else 1
 
 

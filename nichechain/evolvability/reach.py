@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
@@ -17,10 +17,16 @@ from nichechain.evolvability.coverage import at_least_once, visit_probabilities
 from nichechain.evolvability.question import DRAWS, Convention, Question, Root
 from nichechain.niches import Niche
 
+if TYPE_CHECKING:
+    import pandas as pd
+
 Floats = NDArray[np.float64]
 
 # Share of possible transitions from which on walks of a few steps see most states.
 _DENSE = 0.05
+
+MOST_POWERS = 12
+"""Steps up to which returns in a matrix that is not sparse are those of its powers."""
 
 
 @dataclass(frozen=True)
@@ -64,6 +70,8 @@ class Reach:
 
     def to_frame(self, chain: NicheChain) -> pd.DataFrame:
         """One row per niche, with its label, the surest first."""
+        import pandas as pd
+
         frame = pd.DataFrame(
             {
                 "niche": np.arange(self.visit.size),
@@ -175,19 +183,25 @@ def visit_probability(transition: Transition, first: Floats, steps: int) -> tupl
     probability p_k = Σ_i f_i r_{k−i}, where f_i is the probability that step i is its first visit
     and r_m that of a return after m steps. Only the returns need walks of their own: from the
     states that are reached, and only for as many steps as are left by then. In a matrix that is
-    not sparse they soon see all others; the recursion over all roots is faster there.
+    not sparse they soon see all others. Returns of few steps are there diagonals of T^m, products of two
+    powers half as high; for more steps the recursion over all roots is faster.
     """
-    rows: sparse.csr_array | PooledTransition
-    if isinstance(transition, PooledTransition):
-        rows, dense = transition, True
-    else:
-        rows = sparse.csr_array(transition)
-        dense = rows.nnz > _DENSE * first.size**2
+    rows, dense = transition, True
+    if not isinstance(transition, PooledTransition):
+        dense = bool(np.count_nonzero(_entries(transition)) > _DENSE * first.size**2)
+        if not dense:
+            rows = sparse.csr_array(transition)
     present = np.zeros((steps, first.size))
     present[0] = first
     for k in range(1, steps):
         present[k] = present[k - 1] @ rows
     passes = present.sum(axis=0)
+    if dense and steps <= MOST_POWERS and not isinstance(rows, PooledTransition):
+        returns = _returns(rows if isinstance(rows, np.ndarray) else rows.toarray(), steps - 1)
+        new = present.copy()
+        for k in range(1, steps):
+            new[k] = np.maximum(present[k] - (new[:k] * returns[k - 1 :: -1]).sum(axis=0), 0.0)
+        return np.clip(new.sum(axis=0), 0.0, 1.0), passes
     if dense:
         blocks = [h for _, h in visit_probabilities(transition, first[None, :], steps)]
         return np.minimum(np.hstack(blocks)[0], 1.0), passes
@@ -200,8 +214,28 @@ def visit_probability(transition: Transition, first: Floats, steps: int) -> tupl
         from nichechain.evolvability.returns import return_probabilities
 
         # Some state is occupied at once, so the longest return wanted is as long as the walk.
+        assert isinstance(rows, sparse.csr_array)
         returns = return_probabilities(rows, again, steps - 1 - arrival[again])
         for k in range(1, steps):
             earlier = new[:k, again] * returns[k - 1 :: -1]
             new[k, again] = np.maximum(present[k, again] - earlier.sum(axis=0), 0.0)
     return np.clip(new.sum(axis=0), 0.0, 1.0), passes
+
+
+def _entries(transition: Floats | sparse.csr_array) -> Floats:
+    return transition if isinstance(transition, np.ndarray) else transition.data
+
+
+def _returns(transition: Floats, longest: int) -> Floats:
+    """Probability that a walk from each state is there again after 1 to ``longest`` steps, (longest, S)."""
+    returns = np.empty((longest, len(transition)))
+    returns[:1] = transition.diagonal()
+    low = high = transition
+    for m in range(2, longest + 1):
+        # T^m is low · high.
+        if m % 2:
+            high = low @ transition
+        else:
+            low = high
+        returns[m - 1] = (low * high.T).sum(axis=1)
+    return returns

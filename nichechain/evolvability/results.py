@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 from nichechain.chain.model import NicheChain
 from nichechain.core.checks import check_whole
 from nichechain.core.notebook import facts_table
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 Floats = NDArray[np.float64]
 
@@ -116,6 +119,8 @@ class NicheEvolvability:
 
     def to_frame(self, chain: NicheChain) -> pd.DataFrame:
         """One row per niche, with its label."""
+        import pandas as pd
+
         columns = {
             "niche": np.arange(self.value.size),
             "index": [chain.label(niche) for niche in range(self.value.size)],

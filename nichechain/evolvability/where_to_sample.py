@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 from scipy import sparse
 
@@ -13,6 +14,9 @@ from nichechain.core.errors import NichechainError
 from nichechain.evolvability.coverage import expected_coverage
 from nichechain.evolvability.question import DRAWS, Convention, Question
 from nichechain.niches import Niche
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 Floats = NDArray[np.float64]
 
@@ -71,6 +75,8 @@ def where_to_sample(
     m / (m + e α), as the posterior mean of a Dirichlet row is linear in what is seen. Memory and
     time are those of dense (S, S) matrices.
     """
+    import pandas as pd
+
     check_at_least(1, births=births)
     check_at_least(2, draws=draws)
     question = Question(l, lineages, convention, draws=draws, seed=seed)

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 from nichechain.core.checks import as_floats, check_at_least, check_seed, check_share
@@ -29,6 +28,8 @@ from nichechain.variation import AdditiveMutation, Mutation, SelfAdaptiveMutatio
 from nichechain.variation.noise import BallNoise
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from nichechain.archive.archive import Archive
     from nichechain.execution import Executor
 
@@ -154,6 +155,8 @@ class Landscape:
 
     def frame(self) -> pd.DataFrame:
         """One row per elite: where and who it is, its measures, and whether it is a dissimilum."""
+        import pandas as pd
+
         measures = self.measures
         columns: dict[str, Any] = {
             "niche": self.state,

@@ -6,7 +6,6 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 from nichechain.births.table import LINEAGE
@@ -25,6 +24,8 @@ from nichechain.landscape.dissimila import find_dissimila
 from nichechain.search.parents import curiosity
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from nichechain.archive.archive import Archive
 
 Floats = NDArray[np.float64]
@@ -82,6 +83,8 @@ def niche_table(
     happened to make, fewer or more of each: :func:`nichechain.landscape.measure_archive` evaluates a
     sample of the same size for all.
     """
+    import pandas as pd
+
     check_at_least(2, children=children)
     question = Question(l, lineages, draws=draws, seed=seed)
     counts = archive.counts
@@ -110,6 +113,8 @@ def niche_table(
 
 def _curiosity(births: pd.DataFrame) -> pd.DataFrame:
     """Curiosity and share of children that entered, by niche; missing where births do not say who entered."""
+    import pandas as pd
+
     # The parent of such a birth was selected by nobody.
     selected = births if LINEAGE not in births else births[~births[LINEAGE].fillna(value=False).astype(bool)]
     if selected["accepted"].isna().any():
@@ -120,6 +125,8 @@ def _curiosity(births: pd.DataFrame) -> pd.DataFrame:
 
 def _wormholes(chain: NicheChain) -> pd.DataFrame:
     """Wormholes that begin and end in each niche; missing where T has no posterior."""
+    import pandas as pd
+
     niches = pd.RangeIndex(chain.n_niches)
     if chain.posterior is None:
         return pd.DataFrame({"wormholes_out": pd.NA, "wormholes_in": pd.NA}, niches, dtype="Int64")
@@ -135,6 +142,8 @@ def _wormholes(chain: NicheChain) -> pd.DataFrame:
 
 def _dissimila(archive: Archive, births: pd.DataFrame, fewest: int) -> pd.DataFrame:
     """r* of the recorded children of each niche's elite, and whether it is a dissimilum."""
+    import pandas as pd
+
     elites = archive.elites[np.flatnonzero(archive.elites.niche < len(archive.niches))]
     axes = [f"behavior_{name}" for name in archive.meta.facts.behavior_names]
     there = births["failed"].isna() & births["parent_uid"].isin(elites.uid)

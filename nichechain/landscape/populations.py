@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
-import pandas as pd
 
 from nichechain.births.table import check_columns
 from nichechain.core.errors import NichechainError
 from nichechain.landscape.behaviors import one_hot_evolvability, population_evolvability
 from nichechain.niches import Niches
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 def population_course(births: pd.DataFrame, niches: Niches) -> pd.DataFrame:
@@ -38,6 +42,8 @@ def population_course(births: pd.DataFrame, niches: Niches) -> pd.DataFrame:
     -----
     Source: Eq. 10 of the paper, η* over the members of the next generation, and Eq. 9 for their niches.
     """
+    import pandas as pd
+
     axes = sorted(name for name in births.columns if str(name).startswith("behavior_"))
     check_columns(births, "run", "step", "child_niche")
     if len(axes) != len(niches.bounds):

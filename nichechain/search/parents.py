@@ -16,16 +16,18 @@ never stopped.
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 from nichechain.births.table import NONE, check_columns
 from nichechain.core.checks import check_choice
 from nichechain.core.errors import NichechainError
 from nichechain.search.selection import Told
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 import pyarrow as pa
 from numpy.typing import NDArray
 from scipy.special import stdtrit
@@ -25,6 +25,9 @@ from nichechain.evolvability.level import level
 from nichechain.evolvability.question import Question
 from nichechain.execution.side_by_side import side_by_side
 from nichechain.niches import Niches
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -101,6 +104,8 @@ class Contrast:
 
     def to_frame(self) -> pd.DataFrame:
         """One row per figure, with the fields of :class:`ContrastRow`."""
+        import pandas as pd
+
         return pd.DataFrame([asdict(row) for row in self.rows])
 
 

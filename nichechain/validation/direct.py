@@ -9,9 +9,9 @@ generation 1 is drawn from the niche's row of T, the root does not count, nor do
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 from scipy.special import stdtrit
 
@@ -27,6 +27,9 @@ from nichechain.evolvability.record import draw_children, own_strength
 from nichechain.niches import Niches
 from nichechain.validation.rollouts import Lineages, niches_reached
 from nichechain.validation.simulate import simulate_lineages
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -96,6 +99,8 @@ class DirectCheck:
             above 1 where elites differ more than the chain says; ``covered``, the share of elites
             whose number lies in the chain's 90 % interval.
         """
+        import pandas as pd
+
         rows = []
         for prediction in self.predictions:
             low, high = prediction.interval
@@ -126,6 +131,8 @@ class DirectCheck:
 
     def to_frame(self) -> pd.DataFrame:
         """One row per start, elite and generation: niches reached, predicted, 90 % interval."""
+        import pandas as pd
+
         roots, generations = self.reached.shape
         parts = []
         for prediction in self.predictions:

@@ -8,9 +8,9 @@ l-evolvability over niches.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 import pyarrow as pa
 import pyarrow.compute as pc
 from numpy.typing import NDArray
@@ -26,7 +26,11 @@ from nichechain.core.errors import NichechainError
 from nichechain.core.randomness import Purpose, keyed
 from nichechain.evolvability.coverage import expected_coverage
 from nichechain.evolvability.question import Question
+from nichechain.execution.side_by_side import side_by_side
 from nichechain.niches import Niches
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -114,6 +118,8 @@ class LevelCourse:
 
     def to_frame(self) -> pd.DataFrame:
         """One row per part, with the fields as columns."""
+        import pandas as pd
+
         return pd.DataFrame({name: getattr(self, name) for name in _COURSE})
 
 
@@ -311,11 +317,14 @@ def _levels(
     chain = with_posterior(counts, replace(posterior, law=law), "early or late")
     # Draws of their own: parts must not agree for having been drawn alike.
     seed = int(keyed(question.seed, Purpose.RESAMPLING, number).integers(2**31))
-    found = []
-    for drawn in replace(question, seed=seed).samples(chain):
+    question = replace(question, seed=seed)
+
+    def mean(number: int) -> float:
+        drawn = question.sample(chain, number)
         first = drawn.children(compared)
         covered = expected_coverage(
             drawn.onward, first, question.l, question.lineages, counted=len(counts.niches)
         )
-        found.append(covered.mean())
-    return np.array(found)
+        return float(covered.mean())
+
+    return np.array(side_by_side(mean, range(question.draws)))

@@ -13,7 +13,6 @@ from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 from nichechain.births.families import elites_of, folds_of
@@ -31,6 +30,8 @@ from nichechain.niches import GridNiches
 from nichechain.validation.held_out import probability_of
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from nichechain.archive.archive import Archive
 
 Floats = NDArray[np.float64]
@@ -164,6 +165,8 @@ class Sweep:
 
     def to_frame(self) -> pd.DataFrame:
         """One row per grid, with the fields of :class:`GridSize`."""
+        import pandas as pd
+
         frame = pd.DataFrame([asdict(grid) for grid in self.grids])
         frame["shape"] = [_by(grid.shape) for grid in self.grids]
         return frame

@@ -6,12 +6,10 @@ import math
 from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass
 from functools import partial
-from typing import get_args
+from typing import TYPE_CHECKING, get_args
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
-from scipy.optimize import minimize
 from scipy.special import gammaln, softmax
 
 from nichechain.births.families import elites_of, folds_of
@@ -25,6 +23,9 @@ from nichechain.core.arrays import entries_at
 from nichechain.core.checks import check_at_least
 from nichechain.core.errors import NichechainError
 from nichechain.core.randomness import Purpose, keyed
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -80,6 +81,8 @@ class Comparison:
 
     def to_frame(self) -> pd.DataFrame:
         """One row per estimator, with the fields of :class:`HeldOut`."""
+        import pandas as pd
+
         return pd.DataFrame([asdict(row) for row in self.rows])
 
 
@@ -148,6 +151,8 @@ def marginal_likelihood_fit(counts: TransitionCounts) -> NicheChain:
     parent, child = (axis.astype(np.int64) for axis in entries.coords)
     components = BaseMeasure.pooled(counts, even).components(parent, child)
     births = counts.births[counts.births > 0]
+
+    from scipy.optimize import minimize
 
     def unpack(x: Floats) -> tuple[float, Floats]:
         weights = _FLOOR + (1.0 - 3.0 * _FLOOR) * softmax(np.append(x[1:], 0.0))

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import json
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 
 from nichechain.archive.archive import Archive
 from nichechain.core.checks import check_at_least, check_whole
@@ -26,6 +25,9 @@ from nichechain.validation.markov import (
     sibling_test,
 )
 from nichechain.validation.rollouts import OFFSPRING, OnDone, run_lineages, sample_roots
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 @dataclass(frozen=True)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 from nichechain.archive.archive import Archive
@@ -19,6 +19,9 @@ from nichechain.evolvability.niches import answer_for_niches
 from nichechain.evolvability.question import Question
 from nichechain.execution import Executor
 from nichechain.variation.unborn import Unborn, litters
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 Float32s = NDArray[np.float32]
 Ints = NDArray[np.int64]
@@ -63,6 +66,8 @@ class Lineages:
 
     def to_frame(self) -> pd.DataFrame:
         """One row per birth: root, lineage, generation, state (null where it failed)."""
+        import pandas as pd
+
         index = np.indices(self.states.shape).reshape(3, -1)
         state = pd.array(self.states.ravel(), "Int64")
         state[self.states.ravel() == NONE] = pd.NA

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
-import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from nichechain.births.table import NONE
@@ -12,6 +13,9 @@ from nichechain.core.checks import as_whole, check_at_least, check_numbers, chec
 from nichechain.core.errors import NichechainError
 from nichechain.core.row_sampler import RowSampler
 from nichechain.evolvability.coverage import entries
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 Ints = NDArray[np.int64]
 
@@ -134,6 +138,8 @@ def simulate_lineages(matrix: Matrix, first: ArrayLike, generations: int, rng: n
 
 
 def _frame(**columns: Ints) -> pd.DataFrame:
+    import pandas as pd
+
     births = len(columns["depth"])
     frame = pd.DataFrame({"run": np.zeros(births, np.int64), "uid": np.arange(births), **columns})
     nullable = ["parent_uid", "parent_niche", "child_niche"]

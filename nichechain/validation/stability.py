@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal, get_args
+from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 from nichechain.births.families import elites_of, tabulated
@@ -20,6 +19,9 @@ from nichechain.core.randomness import Purpose, keyed
 from nichechain.evolvability.niches import answer_for_niches
 from nichechain.evolvability.question import Question
 from nichechain.execution.side_by_side import side_by_side
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -107,6 +109,8 @@ class RankStability:
 
     def to_frame(self) -> pd.DataFrame:
         """One row per part: fraction, births, mean, smallest and largest correlation, mean level."""
+        import pandas as pd
+
         return pd.DataFrame(
             {
                 "fraction": self.fractions,

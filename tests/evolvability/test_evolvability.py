@@ -541,3 +541,24 @@ def test_one_root_of_many_sparse_states_has_the_closed_form():
     T = sparse.csr_array(entries, shape=(1200, 1200))
     found = l_evolvability(NicheChain(T), niche=5, l=6, lineages=20).value
     assert found == pytest.approx(expected_coverage(T, T[[5]], 6, 20)[0], rel=1e-12)
+
+
+@pytest.mark.parametrize("l", range(1, 13))
+def test_one_root_of_a_whole_matrix_has_the_closed_form(l):
+    from nichechain.evolvability import expected_coverage
+
+    T = np.random.default_rng(l).dirichlet(np.full(30, 0.2), 30)
+    found = l_evolvability(NicheChain(T), niche=5, l=l, lineages=20).value
+    assert found == pytest.approx(expected_coverage(T, T[[5]], l, 20)[0], rel=1e-12)
+
+
+def test_rows_of_elites_do_not_depend_on_who_else_is_asked_for():
+    from nichechain.evolvability.question import DrawnChain
+
+    rows = np.random.default_rng(0).dirichlet(np.full(40, 0.5), 40)
+    drawn = DrawnChain(rows, rows, 9.0, seed=3, number=2)
+    some = np.array([39, 3, 17, 16])
+    whole = drawn.children(np.arange(40))
+    np.testing.assert_array_equal(drawn.children(some), whole[some])
+    np.testing.assert_allclose(whole.sum(axis=1), 1.0)
+    assert np.abs(DrawnChain(rows, rows, 9.0, seed=3, number=1).children(some) - whole[some]).max() > 0.1

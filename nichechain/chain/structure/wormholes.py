@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Literal, get_args
+from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 from scipy import sparse
 from scipy.special import betaincc
@@ -16,6 +15,9 @@ from nichechain.chain.model import NicheChain
 from nichechain.chain.structure.transitions import rows_of
 from nichechain.core.checks import as_whole, check_at_least, check_choice, check_numbers
 from nichechain.core.errors import NichechainError
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -73,6 +75,8 @@ def wormholes(
     semiparametric hierarchical mixture method". A pair's own births are left out of what is
     expected of it, or a rare jump would explain itself.
     """
+    import pandas as pd
+
     check_choice("beyond", beyond, get_args(Beyond))
     check_numbers(times=times, expected_false=expected_false)
     if not (np.isfinite(times) and times >= 1.0):

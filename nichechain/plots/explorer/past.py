@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 from nichechain.archive.archive import Archive
@@ -13,6 +12,9 @@ from nichechain.births.joins import parent_rows
 from nichechain.births.table import NONE
 from nichechain.evolvability.question import MOST_EXACT
 from nichechain.plots.explorer.packing import packed
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 Ints = NDArray[np.int64]
 
