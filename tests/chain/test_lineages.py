@@ -42,7 +42,8 @@ def born(broods, *, stay=0.0, concentration=None, births=20_000, seed=1):
     for root in rng.integers(STATES, size=broods):
         own = tilted(T, stay)
         if concentration is not None:
-            own = scattered_rows(own, concentration, rng)
+            own = rng.standard_gamma(concentration * own)
+            own /= own.sum(axis=1, keepdims=True)
         elite, uid = uid, uid + 1
         for _ in range(BROOD):
             here, before = root, elite
