@@ -112,7 +112,9 @@ def check_columns(births: pa.Table | pd.DataFrame, *names: str) -> None:
     NichechainError
         If it does.
     """
-    there = births.column_names if isinstance(births, pa.Table) else births.columns
+    there = births.column_names if isinstance(births, pa.Table) else getattr(births, "columns", None)
+    if there is None:
+        raise NichechainError(f"births are of type {type(births).__name__}, but must be a table with columns")
     missing = [name for name in names if name not in there]
     if missing:
         raise NichechainError(f"births have no column {missing[0]}, but need {', '.join(names)}")

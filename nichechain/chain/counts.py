@@ -14,7 +14,7 @@ from nichechain.births.families import tabulated
 from nichechain.births.joins import across_runs
 from nichechain.births.lineages import lineages_of, no_lineages
 from nichechain.births.table import LINEAGE, NONE
-from nichechain.core.checks import as_floats, as_whole
+from nichechain.core.checks import as_floats, as_whole, shown
 from nichechain.core.errors import NichechainError
 from nichechain.core.notebook import facts_table
 from nichechain.niches import Niches
@@ -155,8 +155,8 @@ class TransitionCounts:
         NichechainError
             If a trajectory is no sequence of states that exist.
         """
-        if not isinstance(trajectories, Iterable):
-            raise NichechainError(f"trajectories is {trajectories!r}, but must be sequences of states")
+        if not isinstance(trajectories, Iterable) or getattr(trajectories, "ndim", 1) == 0:
+            raise NichechainError(f"trajectories is {shown(trajectories)}, but must be sequences of states")
         lineages = [as_whole("trajectories", each) for each in trajectories]
         for lineage in lineages:
             if lineage.ndim != 1:

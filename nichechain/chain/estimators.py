@@ -77,7 +77,7 @@ def estimate(
     if estimator == "mle":
         if strength is not None:
             raise NichechainError("strength belongs to empirical-bayes and dirichlet, not to mle")
-        return _mle(counts, unvisited or "self")
+        return _mle(counts, "self" if unvisited is None else unvisited)
     if unvisited is not None:
         raise NichechainError(f"unvisited belongs to mle: {estimator} has a posterior for every row")
     if estimator == "dirichlet":

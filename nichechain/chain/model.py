@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property
+from numbers import Integral
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
@@ -10,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
 from nichechain.chain.operator import PooledTransition
+from nichechain.core.checks import shown
 from nichechain.core.errors import NichechainError
 from nichechain.core.notebook import facts_table
 from nichechain.niches import OUTSIDE, Niche, Niches
@@ -79,8 +81,10 @@ class NicheChain:
         self.states: int = (
             posterior.counts.niches.states if posterior is not None else self._given.shape[0]  # type: ignore[union-attr]
         )
-        if outside is not None and outside != self.states - 1:
-            raise NichechainError(f"outside is {outside}, but must be the last state, {self.states - 1}")
+        if outside is not None and (not isinstance(outside, Integral) or outside != self.states - 1):
+            raise NichechainError(
+                f"outside is {shown(outside)}, but must be the last state, {self.states - 1}"
+            )
         self.outside = outside
         self.n_niches = self.states - (outside is not None)
         if niches is not None and len(niches) != self.n_niches:
@@ -148,8 +152,8 @@ class NicheChain:
             return self.niches.state(niche)
         if self.outside is not None and niche in (OUTSIDE, self.outside):
             return self.outside
-        if not isinstance(niche, (int, np.integer)):
-            raise NichechainError(f"niche is {niche}, but this chain has no grid: give its number")
+        if not isinstance(niche, (int, np.integer)) or isinstance(niche, np.timedelta64):
+            raise NichechainError(f"niche is {shown(niche)}, but this chain has no grid: give its number")
         if not 0 <= niche < self.n_niches:
             raise NichechainError(f"niche is {niche}, but this chain has niches 0 to {self.n_niches - 1}")
         return int(niche)

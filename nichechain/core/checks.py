@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import operator
 from collections.abc import Iterable, Mapping
-from numbers import Integral, Real
+from numbers import Integral, Rational, Real
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
 from nichechain.core.errors import NichechainError
@@ -23,6 +23,26 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
 
+_MOST_SHOWN = 80
+
+
+def shown(value: object) -> str:
+    """A value as a sentence can have it: on one line, and not all of a large one."""
+    text = " ".join(repr(value).split())
+    return text if len(text) <= _MOST_SHOWN else f"{text[: _MOST_SHOWN - 3]}..."
+
+
+def _is_whole(value: object) -> bool:
+    """Whether it is a whole number; NumPy has spans of time among its integers."""
+    if not isinstance(value, Integral):
+        return False
+    try:
+        operator.index(value)
+    except TypeError:
+        return False
+    return True
+
+
 def check_whole(**values: object) -> None:
     """Refuse what is no whole number.
 
@@ -37,8 +57,8 @@ def check_whole(**values: object) -> None:
         If a value is of another type: a float is refused even where its value is whole.
     """
     for name, value in values.items():
-        if not isinstance(value, Integral):
-            raise NichechainError(f"{name} is {value!r}, but must be a whole number")
+        if not _is_whole(value):
+            raise NichechainError(f"{name} is {shown(value)}, but must be a whole number")
 
 
 def check_numbers(**values: object) -> None:
@@ -50,8 +70,9 @@ def check_numbers(**values: object) -> None:
         If a value is neither a float nor a whole number.
     """
     for name, value in values.items():
-        if not isinstance(value, Real):
-            raise NichechainError(f"{name} is {value!r}, but must be a number")
+        # Of fractions, those that NumPy can calculate with.
+        if not isinstance(value, Real) or (isinstance(value, Rational) and not _is_whole(value)):
+            raise NichechainError(f"{name} is {shown(value)}, but must be a number")
 
 
 def check_at_least(least: int, **values: object) -> None:
@@ -113,7 +134,7 @@ def check_choice(name: str, value: object, allowed: Iterable[str]) -> None:
     """
     words = tuple(allowed)
     if not isinstance(value, str) or value not in words:
-        raise NichechainError(f"{name} is {value!r}, but must be one of {', '.join(words)}")
+        raise NichechainError(f"{name} is {shown(value)}, but must be one of {', '.join(words)}")
 
 
 def check_seed(seed: object) -> None:

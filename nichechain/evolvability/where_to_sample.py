@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 _COLUMNS = 128
+# What a derivative may keep of all generations, for one block of niches.
+_MOST_BYTES = 2**30
 
 
 def where_to_sample(
@@ -153,6 +155,12 @@ def evolvability_derivative(
 def _derivative(chain: NicheChain, niche: Niche | None, question: Question) -> Floats:
     states, n = chain.states, chain.n_niches
     weight = _weight(chain, niche)
+    most = max(1, _MOST_BYTES // (8 * states * min(n, _COLUMNS)))
+    if question.steps > most:
+        raise NichechainError(
+            f"l is {question.l}, but the derivative keeps what each generation visits: "
+            f"of {states} states there is room for {most} generations"
+        )
     matrix = chain.T
     back: Matrix = matrix.T if isinstance(matrix, np.ndarray) else sparse.csr_array(matrix.T)
     slope = np.zeros((states, states))

@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from nichechain.core.checks import EPSILON, as_bounds, as_shape, check_choice, check_numbers
+from nichechain.core.checks import EPSILON, as_bounds, as_shape, check_choice, check_numbers, shown
 from nichechain.core.errors import NichechainError
 from nichechain.niches.base import MOST_NICHES, OUTSIDE_MODES, Floats, Ints, Niche, Niches, check_bounds
 
@@ -90,7 +90,8 @@ class GridNiches(Niches):
         NichechainError
             If it is outside the grid or has the wrong number of axes.
         """
-        if isinstance(niche, (int, np.integer)):
+        # NumPy has spans of time among its integers.
+        if isinstance(niche, (int, np.integer)) and not isinstance(niche, np.timedelta64):
             if not 0 <= niche < len(self):
                 raise NichechainError(f"niche is {niche}, but the grid has niches 0 to {len(self) - 1}")
             return int(niche)
@@ -98,7 +99,7 @@ class GridNiches(Niches):
             index = tuple(operator.index(k) for k in niche)  # type: ignore[arg-type]  # a text raises
         except TypeError:
             raise NichechainError(
-                f"niche is {niche!r}, but must be a whole number or one per axis of the grid"
+                f"niche is {shown(niche)}, but must be a whole number or one per axis of the grid"
             ) from None
         if len(index) != len(self.shape):
             raise NichechainError(f"niche is {index}, but a niche of this grid has {len(self.shape)} indices")

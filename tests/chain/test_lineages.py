@@ -9,7 +9,7 @@ from scipy import sparse
 
 import nichechain as nc
 from nichechain.chain import estimate
-from nichechain.chain.lineages import LineageLaw, fitted_law, scattered_rows
+from nichechain.chain.lineages import LineageLaw, fitted_law
 from nichechain.chain.operator import PooledTransition
 from nichechain.chain.urns import UrnRows
 from nichechain.core.row_sampler import RowSampler

@@ -27,8 +27,10 @@ def states_of(chain: NicheChain, target: Target, name: str = "target") -> Ints:
     NichechainError
         If there is no such niche, or the target is empty.
     """
-    if isinstance(target, (list, np.ndarray)) or (
-        isinstance(target, Sequence) and not isinstance(target, (tuple, str))
+    if (
+        isinstance(target, list)
+        or (isinstance(target, np.ndarray) and target.ndim)
+        or (isinstance(target, Sequence) and not isinstance(target, (tuple, str)))
     ):
         several = list(target)
     else:

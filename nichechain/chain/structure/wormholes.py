@@ -20,6 +20,9 @@ if TYPE_CHECKING:
     import pandas as pd
 
 Floats = NDArray[np.float64]
+
+# Growth that is rounding.
+_SETTLED = 1e-15
 Ints = NDArray[np.int64]
 Beyond = Literal["displacement", "both"]
 
@@ -151,7 +154,8 @@ def wormhole_exposure(chain: NicheChain, found: pd.DataFrame, *, l: int = 1) -> 
     e_0 = 0: the probability that one of them is among the first k steps.
     """
     check_at_least(1, l=l)
-    missing = [name for name in ("parent", "child", "wormhole") if name not in found]
+    columns = getattr(found, "columns", ())
+    missing = [name for name in ("parent", "child", "wormhole") if name not in columns]
     if missing:
         raise NichechainError(f"found has no column {missing[0]}, but must be a table of wormholes")
     flagged = found[found["wormhole"].astype(bool)]
@@ -168,8 +172,12 @@ def wormhole_exposure(chain: NicheChain, found: pd.DataFrame, *, l: int = 1) -> 
     taken = np.asarray(ways.sum(axis=1)).ravel()
     exposure = taken
     for _ in range(l - 1):
+        before = exposure
         onward = rows @ exposure - ways @ exposure if others is None else others @ exposure
         exposure = taken + onward
+        # The largest growth never grows again.
+        if np.abs(exposure - before).max() <= _SETTLED:
+            break
     at_most_one: Floats = np.minimum(exposure, 1.0)
     return at_most_one
 
