@@ -42,6 +42,13 @@ def test_no_two_public_classes_bear_one_name() -> None:
     assert {name: found for name, found in homes.items() if len(found) > 1} == {}
 
 
+def test_nothing_reads_a_clock_that_may_be_set() -> None:
+    # Whoever sets the clock, or lets it jump, changes no checkpoint and no figure of progress.
+    clock = re.compile(r"\btime\.time(?:_ns)?\(|from time import [^\n]*\btime\b|\bdatetime\b")
+    found = [path.name for path in PACKAGE.rglob("*.py") if clock.search(path.read_text(encoding="utf-8"))]
+    assert found == []
+
+
 @pytest.mark.parametrize("package", PACKAGES)
 def test_a_package_says_what_is_for_users(package: str) -> None:
     if package in EXTRA:

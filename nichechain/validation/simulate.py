@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from nichechain.births.table import NONE
 from nichechain.chain.model import Matrix, NicheChain
-from nichechain.core.checks import as_whole, check_at_least, check_numbers, check_whole
+from nichechain.core.checks import as_whole, check_at_least, check_choice, check_numbers, check_whole
 from nichechain.core.errors import NichechainError
 from nichechain.core.row_sampler import RowSampler
 from nichechain.evolvability.coverage import entries
+from nichechain.search.config import Replacement
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -28,11 +29,12 @@ def simulate_births(
     start: ArrayLike = 0,
     batch: int = 64,
     memory: float = 0.0,
+    replacement: Replacement = "random",
 ) -> pd.DataFrame:
     """Births of a MAP-Elites run in which a child's niche depends on its parent's alone.
 
-    Parents are drawn uniformly from the occupied states; the elite of a state is a uniform sample
-    of the births there, as with random replacement.
+    Parents are drawn uniformly from the occupied states. Who is the elite of a state follows a rule of
+    :class:`nichechain.search.BuildConfig`.
 
     Parameters
     ----------
@@ -48,6 +50,9 @@ def simulate_births(
     memory : float
         Probability that a child falls back to the state of its grandparent, if it has one: above
         0 the births are no chain's.
+    replacement : {"random", "first", "newest", "objective"}
+        Which birth of a state is its elite: each alike, the first, the last, or the best. An objective is
+        that of the parent and a standard normal number.
 
     Returns
     -------
@@ -70,6 +75,7 @@ def simulate_births(
         )
     if not 0.0 <= memory <= 1.0:
         raise NichechainError(f"memory is {memory}, but must be a probability")
+    check_choice("replacement", replacement, get_args(Replacement))
     sampler = RowSampler(entries(chain.T))
     columns = {
         name: np.full(births, NONE, np.int64) for name in ("parent_uid", "parent_niche", "child_niche")
@@ -78,6 +84,7 @@ def simulate_births(
     depth, step = np.zeros(births, np.int64), np.zeros(births, np.int64)
     elite = np.full(chain.states, NONE, np.int64)
     largest = np.full(chain.states, -np.inf)
+    keys = np.zeros(births)
     done, number = 0, 0
     while done < births:
         here = slice(done, min(births, done + (batch if number else first.size)))
@@ -94,7 +101,17 @@ def simulate_births(
         else:
             niche[here] = first
         step[here] = number
-        key = rng.random(size)
+        key: NDArray[np.float64]
+        match replacement:
+            case "random":
+                key = rng.random(size)
+            case "objective":
+                key = rng.standard_normal(size)
+                key += np.where(parent[here] == NONE, 0.0, keys[parent[here]])
+            case _:
+                key = np.arange(here.start, here.stop, dtype=np.float64)
+                key = -key if replacement == "first" else key
+        keys[here] = key
         # The last of several writes to one place stays, and that is the largest key.
         order = np.argsort(key)
         best = np.full(chain.states, NONE, np.int64)

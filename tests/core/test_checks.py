@@ -1,9 +1,18 @@
 import math
+from fractions import Fraction
 
 import numpy as np
 import pytest
 
-from nichechain.core.checks import check_at_least, check_choice, check_positive, check_share
+from nichechain.core.checks import (
+    check_at_least,
+    check_choice,
+    check_numbers,
+    check_positive,
+    check_share,
+    check_whole,
+    shown,
+)
 from nichechain.core.errors import NichechainError
 
 
@@ -37,3 +46,23 @@ def test_what_is_in_range_passes():
     check_positive(scale=np.float32(0.5), size=3)
     check_share(share=1)
     check_choice("mode", "b", iter(("a", "b")))
+
+
+def test_what_only_counts_among_numbers_is_refused():
+    span = np.timedelta64(3, "D")
+    for check in (check_whole, check_numbers):
+        with pytest.raises(NichechainError, match=r"it is .*must be a"):
+            check(it=span)
+    with pytest.raises(NichechainError, match="must be a number"):
+        check_numbers(it=Fraction(1, 3))
+    check_whole(it=np.uint8(3))
+    check_numbers(it=np.float32(0.5), other=True)
+
+
+def test_a_large_value_is_shown_in_part_and_on_one_line():
+    text = shown(np.full((6, 6), 2**63, np.uint64))
+    assert len(text) == 80
+    assert text.startswith("array([[9223372036854775808,")
+    assert text.endswith("...")
+    assert "\n" not in text
+    assert shown("three") == "'three'"

@@ -147,3 +147,8 @@ def test_a_given_chain_cannot_be_narrowed():
     for chain in (NicheChain(np.eye(2)), estimate(counts, "mle")):
         with pytest.raises(NichechainError, match="narrow nothing"):
             where_to_sample(chain)
+
+
+def test_more_generations_than_there_is_room_for_are_refused():
+    with pytest.raises(NichechainError, match="room for"):
+        evolvability_derivative(NicheChain(np.full((3, 3), 1 / 3)), l=10**9)

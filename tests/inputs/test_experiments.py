@@ -243,6 +243,7 @@ CALLS = (
             "start": (3, -1, [], [0.5], "three"),
             "batch": whole(0),
             "memory": SHARE,
+            "replacement": UNKNOWN,
         },
     ),
     Call(

@@ -136,11 +136,11 @@ def test_results_are_functions_of_the_seed(triples):
         )
 
 
-def p_values(chains, births, permutations):
+def p_values(chains, births, permutations, replacement="random"):
     """p of every test on births simulated from each chain."""
     found = {name: [] for name in TESTS}
     for seed, chain in enumerate(chains):
-        triples = simulated(chain, births, seed, batch=32)
+        triples = simulated(chain, births, seed, batch=32, replacement=replacement)
         for name, test in TESTS.items():
             found[name].append(test(triples, permutations=permutations, seed=seed).p_value)
     return {name: np.array(values) for name, values in found.items()}
@@ -161,6 +161,24 @@ def test_a_true_chain_passes_at_the_nominal_rate(kind):
     chains = [local_chain(10) if kind == "local" else scattered_chain(rng, 10) for _ in range(60)]
     for name, p in p_values(chains, 700, 39).items():
         check_rate(p, 0.1, name)
+
+
+@pytest.mark.parametrize("replacement", ["first", "newest", "objective"])
+def test_a_true_chain_passes_whoever_is_an_elite(replacement):
+    for name, p in p_values([local_chain(10)] * 40, 500, 19, replacement).items():
+        check_rate(p, 0.1, name)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("replacement", ["random", "first", "newest", "objective"])
+def test_rates_under_each_rule_of_replacement_in_many_simulations(replacement):
+    rng = np.random.default_rng(13)
+    chains = [local_chain(20) if k % 2 else scattered_chain(rng, 20) for k in range(400)]
+    for name, p in p_values(chains, 2000, 99, replacement).items():
+        found = np.count_nonzero(p <= 0.05)
+        low, high = stats.binomtest(int(found), p.size).proportion_ci()
+        print(f"{replacement:10} {name:20} {found / p.size:.3f} ({low:.3f} to {high:.3f})")
+        check_rate(p, 0.05, name)
 
 
 @pytest.mark.slow

@@ -42,6 +42,26 @@ def test_the_elite_is_a_uniform_sample_of_its_niche():
     assert stats.kstest(np.array(last, float) + 0.5, stats.uniform(0, 33).cdf).pvalue > 1e-3
 
 
+@pytest.mark.parametrize(("replacement", "parent"), [("first", 0), ("newest", 32)])
+def test_the_first_or_the_last_birth_stays(replacement, parent):
+    births = simulate_births(
+        nc.NicheChain([[1.0]]), 41, np.random.default_rng(0), batch=8, replacement=replacement
+    )
+    assert births["parent_uid"].iloc[-1] == parent
+
+
+def test_the_best_birth_has_the_best_parents():
+    # Where a child is as good as its parent and some noise, those that stay go back to few ancestors.
+    chain = nc.NicheChain(np.full((5, 5), 0.2))
+    depth = {
+        rule: simulate_births(chain, 4000, np.random.default_rng(0), batch=8, replacement=rule)[
+            "depth"
+        ].mean()
+        for rule in ("random", "first", "objective")
+    }
+    assert depth["first"] < depth["random"] < depth["objective"]
+
+
 def test_memory_returns_children_to_their_grandparents():
     births = simulate_births(local_chain(), 4000, np.random.default_rng(3), memory=1.0)
     triples = Triples.from_births(births).with_grandparent

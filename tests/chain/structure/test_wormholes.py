@@ -208,3 +208,11 @@ def test_exposure_where_t_is_kept_in_parts(monkeypatch):
 def test_tables_that_name_no_wormholes(found, message):
     with pytest.raises(NichechainError, match=message):
         wormhole_exposure(NicheChain(np.eye(3)), found)
+
+
+def test_a_lineage_without_end_takes_some_wormhole():
+    chain = NicheChain([[0.9, 0.1, 0.0], [0.0, 0.5, 0.5], [0.0, 0.0, 1.0]])
+    found = pd.DataFrame({"parent": [1], "child": [2], "wormhole": [True]})
+    np.testing.assert_allclose(wormhole_exposure(chain, found, l=10**30), [1.0, 1.0, 0.0], atol=1e-12)
+    with pytest.raises(NichechainError, match="found has no column parent"):
+        wormhole_exposure(chain, np.zeros(3))
