@@ -231,41 +231,34 @@ class _Broods:
         self, posterior: DirichletPosterior, first: UrnRows, later: list[UrnRows], rng: np.random.Generator
     ) -> Floats:
         """Niches that such broods reach when their later rows are each of some, (K, B, repeats)."""
-        kinds, generations = len(later), self._present.shape[1]
-        found = np.zeros((kinds, self._size.size, _REPEATS))
+        generations, states = self._present.shape[1], first.strength.size
+        found = np.zeros((len(later), self._size.size, _REPEATS))
         for size in np.unique(self._size):
             these = np.flatnonzero(self._size == size)
-            root = np.tile(np.repeat(self._root[these], _REPEATS * size).reshape(-1, size), (kinds, 1))
-            states = _walks(posterior, first, later, root, generations, rng)[:, size:]
+            roots = np.repeat(self._root[these], _REPEATS * size).reshape(-1, size)
             kept = np.repeat(self._present[these][:, :, :size].reshape(these.size, -1), _REPEATS, axis=0)
-            states = np.where(np.tile(kept, (kinds, 1)) & (states < self._niches), states, -1)
-            states.sort(axis=1)
-            new = (states[:, 1:] != states[:, :-1]).sum(axis=1) + (states[:, 0] >= 0)
-            found[:, these] = new.reshape(kinds, these.size, _REPEATS)
+            small = states <= MOST_STATES and size * (generations + 1) <= MOST_VISITS
+            # Urns of many states are gone through one by one, so that one kind is kept at a time.
+            for some in [slice(0, len(later))] if small else [slice(k, k + 1) for k in range(len(later))]:
+                kinds = later[some]
+                if small:
+                    urns = _small_urns(posterior, first, kinds)
+                    walks = urns.walks(np.tile(roots, (len(kinds), 1)), generations, rng)
+                else:
+                    walks = Urns(posterior, first, kinds[0]).walks(roots, generations, rng, roots=True)
+                visited = walks[:, size:]
+                visited = np.where(np.tile(kept, (len(kinds), 1)) & (visited < self._niches), visited, -1)
+                visited.sort(axis=1)
+                new = (visited[:, 1:] != visited[:, :-1]).sum(axis=1) + (visited[:, 0] >= 0)
+                found[some, these] = new.reshape(len(kinds), these.size, _REPEATS)
         return found
 
 
-def _walks(
-    posterior: DirichletPosterior,
-    first: UrnRows,
-    later: list[UrnRows],
-    roots: Ints,
-    generations: int,
-    rng: np.random.Generator,
-) -> Ints:
-    """States of lineages of roots (g, M), equally many with each of the later rows: (g, (l + 1) M)."""
-    states = first.strength.size
-    if states <= MOST_STATES and roots.shape[1] * (generations + 1) <= MOST_VISITS:
-        base = posterior.base.rows(np.arange(states))
-        begins, goes_on = (
-            WholeRows.of(rows, base, absorbing=posterior.absorbing) for rows in (first, later[0])
-        )
-        return SmallUrns(begins, goes_on.worth(later)).walks(roots, generations, rng)
-    walks = [
-        Urns(posterior, first, rows).walks(some, generations, rng, roots=True)
-        for rows, some in zip(later, np.split(roots, len(later)), strict=True)
-    ]
-    return np.concatenate(walks)
+def _small_urns(posterior: DirichletPosterior, first: UrnRows, later: list[UrnRows]) -> SmallUrns:
+    """Urns of few states, whose later rows differ in nothing but how sure they are."""
+    base = posterior.base.rows(np.arange(first.strength.size))
+    begins, goes_on = (WholeRows.of(rows, base, absorbing=posterior.absorbing) for rows in (first, later[0]))
+    return SmallUrns(begins, goes_on.worth(later))
 
 
 def scattered_rows(rows: Floats, concentration: float, rng: np.random.Generator) -> Floats:
