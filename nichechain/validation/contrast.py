@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pyarrow as pa
+import pyarrow.compute as pc
 from numpy.typing import NDArray
 from scipy.special import stdtrit
 
@@ -179,7 +181,15 @@ def contrast(
         aligned = int(
             np.concatenate([_runs(births) for births in (first, second)]).min(initial=max(recorded))
         )
-        first, second = (_beginnings(births, aligned) for births in (first, second))
+        given = first, second
+        first, second = (_beginnings(births, aligned) for births in given)
+        for name, whole_run, part in zip(("first", "second"), given, (first, second), strict=True):
+            if _has_lineages(whole_run) and not _has_lineages(part):
+                warnings.warn(
+                    f"the {name} archive has lineages, but all after its first {aligned} births, which are "
+                    "compared: its chain is not calibrated here; compare all births to keep them",
+                    stacklevel=2,
+                )
     sides = _Side.of(first, niches), _Side.of(second, niches)
     whole = [side.counts() for side in sides]
     enough = [counts.births[: len(niches)] >= max(1, min_births) for counts in whole]
@@ -280,6 +290,10 @@ def _beginnings(births: pa.Table, number: int) -> pa.Table:
     sizes = _runs(births)
     within = np.arange(len(births)) - np.repeat(np.cumsum(sizes) - sizes, sizes)
     return births.filter(pa.array(within < number))
+
+
+def _has_lineages(births: pa.Table) -> bool:
+    return LINEAGE in births.column_names and bool(pc.any(births[LINEAGE]).as_py())
 
 
 def _shared(first: pa.Table, second: pa.Table) -> int:

@@ -156,6 +156,14 @@ def test_births_of_lineages_are_no_rows_of_t():
     assert found.clusters == (("elites", 160), ("elites", 160))
 
 
+def test_it_is_said_that_lineages_of_the_end_are_cut_off():
+    plain, calibrated = births(4, 14, per_run=900), with_lineages(4, 14)
+    options = {"resamples": 2, "l": 1, "lineages": 5, "min_births": 1}
+    with pytest.warns(UserWarning, match="second archive has lineages, but all after its first 900 births"):
+        contrast(plain, calibrated, GRID, **options)
+    contrast(plain, calibrated, GRID, **options, align=False)
+
+
 @pytest.mark.parametrize("group", [[], [3], "births"])
 def test_what_is_no_group(group):
     with pytest.raises(NichechainError, match="must be a table of births or several"):
