@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from nichechain import walks
 from nichechain.domains import CosinusMap
 from nichechain.variation import PolynomialMutation
-from nichechain.walks.diversity import ArchiveRule, KNearest
+from nichechain.walks.diversity import ArchiveRule, KNearest, OfBehaviors
 
 RUNS, GENERATIONS, EVERY, OFFSPRING, BINS = 20, 300, 20, 300, 50
 
@@ -24,7 +24,7 @@ mutate = PolynomialMutation(-5.0, 5.0, eta=45.0)
 
 
 @dataclass(frozen=True)
-class Fitness:
+class Fitness(OfBehaviors):
     """A diversity metric in name only: minus the distance of behavior to -4."""
 
     remembers = False
