@@ -11,7 +11,7 @@ import math
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -22,15 +22,16 @@ import pyarrow.compute as pc
 
 from nichechain import births
 from nichechain.archive import untrusted
+from nichechain.archive.stored_state import parse_state
 from nichechain.archive.trust import check_origin
-from nichechain.births.table import LINEAGE, Offspring
+from nichechain.births.table import LINEAGE
 from nichechain.core.errors import ArchiveError
 from nichechain.core.text import printable_values
 from nichechain.domains.base import Domain
 from nichechain.niches import Niches
 from nichechain.search.config import BuildConfig
-from nichechain.search.elites import Elites, SearchState
-from nichechain.search.lineages import Calibration, Stretch, UnderWay
+from nichechain.search.elites import SearchState
+from nichechain.search.lineages import Calibration
 from nichechain.search.making import make_niches
 
 FORMAT = 1
@@ -46,35 +47,6 @@ _MOST_ROWS = 1 << 20
 _MOST_NICHES = 1 << 31
 _SMALLEST_LIMIT = 1 << 20
 _NOT_COMMITTED = "its checksum is not the one that was committed"
-
-_INTS, _FLOATS, _GENOTYPES = (np.int64, 1), (np.float64, 1), (np.float32, 2)
-_ARRAYS: dict[str, tuple[Any, int]] = {
-    "niche": _INTS,
-    "genotype": _GENOTYPES,
-    "behavior": (np.float64, 2),
-    "objective": _FLOATS,
-    "key": _FLOATS,
-    "uid": _INTS,
-    "depth": _INTS,
-    "pending_genotype": _GENOTYPES,
-    "pending_uid": _INTS,
-    "pending_parent_uid": _INTS,
-    "pending_parent_niche": _INTS,
-    "pending_depth": _INTS,
-}
-# Files without any lineage lack these.
-_LINEAGE_ARRAYS: dict[str, tuple[Any, int]] = {
-    "pending_lineage": (np.bool_, 1),
-    "lineage_slot": _INTS,
-    "lineage_genotype": _GENOTYPES,
-    "lineage_uid": _INTS,
-    "lineage_niche": _INTS,
-    "lineage_depth": _INTS,
-}
-# And without a contest that goes on, these.
-_CONTENDER_ARRAYS: dict[str, tuple[Any, int]] = {
-    f"contender_{field.name}": _ARRAYS[field.name] for field in fields(Elites)
-}
 
 
 @dataclass(frozen=True)
@@ -338,60 +310,8 @@ def read_state(folder: Path, meta: Meta) -> SearchState:
     """
     content = _read(folder, meta.elites)
     with _reading(folder / meta.elites["file"]):
-        arrays = untrusted.read_arrays(content, _ARRAYS, _LINEAGE_ARRAYS, _CONTENDER_ARRAYS)
-        elites = Elites(*(arrays[field.name] for field in fields(Elites)))
-        arrays.setdefault("pending_lineage", np.zeros(len(arrays["pending_uid"]), bool))
-        pending = Offspring(*(arrays[f"pending_{field.name}"] for field in fields(Offspring)))
-        lineages = UnderWay.none(elites.genotype.shape[1])
-        if "lineage_slot" in arrays:
-            lineages = UnderWay(*(arrays[f"lineage_{field.name}"] for field in fields(UnderWay)))
-        contenders = Elites.none(elites.genotype.shape[1], elites.behavior.shape[1])
-        if "contender_uid" in arrays:
-            contenders = Elites(*(arrays[f"contender_{field.name}"] for field in fields(Elites)))
-        state = SearchState(elites, pending, meta.births, meta.step, lineages, contenders)
-        _check_state(state, meta)
-    return state
-
-
-def _check_state(state: SearchState, meta: Meta) -> None:
-    elites, pending, lineages, contenders = state.elites, state.pending, state.lineages, state.contenders
-    for rows in (elites, pending, lineages, contenders):
-        if len({len(column) for column in rows.columns().values()}) != 1:
-            raise ValueError("its arrays differ in length")
-    if elites.behavior.shape[1] != len(meta.config.bounds):
-        raise ValueError(f"its behaviors have {elites.behavior.shape[1]} axes")
-    if len(pending) and pending.grown().shape[1] != elites.genotype.shape[1]:
-        raise ValueError("its genotypes differ in length")
-    if len(lineages) and lineages.genotype.shape[1] != elites.genotype.shape[1]:
-        raise ValueError("its genotypes differ in length")
-    if contenders.genotype.shape[1] != elites.genotype.shape[1]:
-        raise ValueError("its genotypes differ in length")
-    if contenders.behavior.shape[1] != elites.behavior.shape[1]:
-        raise ValueError("its behaviors differ in their axes")
-    if not np.isin(contenders.niche, elites.niche).all():
-        raise ValueError("its contenders are in niches that nobody holds")
-    if (np.diff(lineages.slot, prepend=-1) <= 0).any():
-        raise ValueError("its lineages are in no order")
-    if (np.diff(elites.niche, prepend=-1) <= 0).any() or (elites.niche > _outside(meta)).any():
-        raise ValueError("its elites are in no order, or in niches that do not exist")
-    if ((lineages.niche < 0) | (lineages.niche > _outside(meta))).any():
-        raise ValueError("its lineages are in niches that do not exist")
-    if meta.origin is None and not meta.calibrations:
-        _check_step(pending, meta)
-
-
-def _check_step(pending: Offspring, meta: Meta) -> None:
-    """Refuse births that do not end in the step that a build of that configuration was in."""
-    steps = Stretch.of_build(meta.config)
-    begins, ends = (-1, 0) if meta.step < 0 else steps.uids(meta.step)
-    if not begins < meta.births <= ends:
-        raise ValueError(
-            f"it has {meta.births} births, but step {meta.step} of its build "
-            f"has those from {max(0, begins)} to {ends - 1}"
-        )
-    # Compared by their number first: anybody may have written how many there should be.
-    if len(pending) != ends - meta.births or (np.diff(pending.uid, prepend=meta.births - 1) != 1).any():
-        raise ValueError(f"its children that are not born yet are not those from {meta.births} to {ends - 1}")
+        of_build = meta.origin is None and not meta.calibrations
+        return parse_state(content, meta.config, meta.births, meta.step, of_build=of_build)
 
 
 def read_births(folder: Path, meta: Meta, columns: list[str] | None = None) -> pa.Table:
@@ -444,11 +364,6 @@ def part_name(number: int, rows: int) -> str:
     return f"{BIRTHS}/part-{number:06d}-{rows:05d}.parquet"
 
 
-def _outside(meta: Meta) -> int:
-    """The largest state that there can be."""
-    return math.prod(meta.config.shape)
-
-
 def read_part(folder: Path, meta: Meta, part: dict[str, Any], columns: list[str] | None = None) -> pa.Table:
     """The births of one part that the metadata name.
 
@@ -466,7 +381,7 @@ def read_part(folder: Path, meta: Meta, part: dict[str, Any], columns: list[str]
         for name in ("parent_niche", "child_niche"):
             if name in table.column_names:
                 bounds = pc.min_max(table[name]).as_py()
-                if (bounds["min"] or 0) < 0 or (bounds["max"] or 0) > _outside(meta):
+                if (bounds["min"] or 0) < 0 or (bounds["max"] or 0) > math.prod(meta.config.shape):
                     raise ValueError(f"it has a {name} that does not exist")
     return table
 

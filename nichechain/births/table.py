@@ -38,6 +38,7 @@ from numpy.typing import NDArray
 from nichechain.core.columns import Columnar
 from nichechain.core.errors import NichechainError
 from nichechain.domains.base import Evaluation
+from nichechain.niches import Niches
 from nichechain.variation.unborn import Unborn, grown
 
 if TYPE_CHECKING:
@@ -118,6 +119,15 @@ def check_columns(births: pa.Table | pd.DataFrame, *names: str) -> None:
     missing = [name for name in names if name not in there]
     if missing:
         raise NichechainError(f"births have no column {missing[0]}, but need {', '.join(names)}")
+
+
+def niches_of(evaluation: Evaluation, niches: Niches | None) -> NDArray[np.int64]:
+    """State that each evaluated genotype landed in, (N,): ``NONE`` where it failed, or nothing is gridded."""
+    state = np.full(len(evaluation), NONE, np.int64)
+    if niches is not None:
+        fine = ~evaluation.failed
+        state[fine] = niches.of(evaluation.behavior[fine])
+    return state
 
 
 def make_table(

@@ -6,11 +6,11 @@ from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import minimize_scalar
 
 from nichechain.births.families import elites_of
 from nichechain.chain.counts import TransitionCounts
 from nichechain.core.arrays import entries_at
-from nichechain.core.minimum import minimum
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -65,4 +65,5 @@ def elite_concentration(
         t = 1.0 / (np.exp(-log_concentration) + 1.0 / told)
         return -float((own * np.log((own - 1.0 + t * expected) / (size - 1.0 + t))).sum())
 
-    return float(np.exp(minimum(surprise, *_LOG_CONCENTRATIONS)))
+    best = minimize_scalar(surprise, bounds=_LOG_CONCENTRATIONS, method="bounded").x
+    return float(np.exp(best))

@@ -13,12 +13,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import minimize_scalar
 
 from nichechain.births.families import elites_of
 from nichechain.chain.counts import TransitionCounts
 from nichechain.chain.families import orphans_of
 from nichechain.core.arrays import entries_at
-from nichechain.core.minimum import minimum
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -110,7 +110,7 @@ def strength_of(counts: TransitionCounts, base: Callable[[Ints, Ints], Floats]) 
         logs: Floats = left.weight * np.log((others + s * probability) / (size + s))
         return logs
 
-    best = minimum(lambda x: -float(foretold(x).sum()), *_LOG_STRENGTHS)
+    best = minimize_scalar(lambda x: -foretold(x).sum(), bounds=_LOG_STRENGTHS, method="bounded").x
     step = 0.05
     below, here, above = (foretold(best + shift) for shift in (-step, 0.0, step))
     bend = -(above - 2.0 * here + below).sum() / step**2

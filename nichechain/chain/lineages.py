@@ -15,11 +15,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
+from scipy.optimize import minimize_scalar
 
 from nichechain.chain.operator import PooledTransition
 from nichechain.chain.small_urns import MOST_STATES, MOST_VISITS, SmallUrns, WholeRows
 from nichechain.chain.urns import UrnRows, Urns
-from nichechain.core.minimum import minimum
 from nichechain.core.randomness import Purpose, keyed
 
 if TYPE_CHECKING:
@@ -85,6 +85,11 @@ class LineageLaw:
         """τ, the median: how many births T's row is worth to the rows of one elite's lineages."""
         middle = np.searchsorted(np.cumsum(self.weights), 0.5)
         return float(np.exp(self.log_concentrations[middle]))
+
+    def taken_as_known(self) -> LineageLaw:
+        """The same with b and τ in the middle of what they may be, for chains that have them in common."""
+        middle = np.array([np.log(self.concentration)])
+        return replace(self, stay_error=0.0, log_concentrations=middle, weights=np.ones(1))
 
     def drawn(self, rng: np.random.Generator) -> tuple[float, float]:
         """B and τ as lineages allow them as well."""
@@ -195,7 +200,7 @@ def _stay(posterior: DirichletPosterior, table: Ints) -> tuple[float, float]:
         prior = 0.5 * (b / _STAY_SPREAD) ** 2
         return float(np.logaddexp(0.0, logit).sum() - logit[stayed].sum() + prior)
 
-    best = minimum(surprise, -6.0, 6.0)
+    best = float(minimize_scalar(surprise, bounds=(-6.0, 6.0), method="bounded").x)
     p = 1.0 / (1.0 + np.exp(-(odds + best)))
     return best, float(1.0 / np.sqrt((p * (1.0 - p)).sum() + _STAY_SPREAD**-2))
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from nichechain.births.table import NONE
+from nichechain.births.table import NONE, niches_of
 from nichechain.core.checks import check_at_least, check_seed
 from nichechain.core.errors import NichechainError
 from nichechain.core.intervals import mean_interval
@@ -115,9 +115,7 @@ def meta_evolvability(
     def landed(unborn: Unborn) -> Ints:
         domain = archive.domain
         found = domain.evaluate(unborn.grow()) if executor is None else executor.evaluate(domain, unborn)
-        state = np.full(len(unborn), NONE, np.int64)
-        state[~found.failed] = archive.niches.of(found.behavior[~found.failed])
-        return state
+        return niches_of(found, archive.niches)
 
     first = litters(mutate, Purpose.OFFSPRING, np.asarray(elite.genotype)[None], seed, children)
     born = landed(first)

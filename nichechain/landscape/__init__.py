@@ -17,7 +17,7 @@ from nichechain.landscape.behaviors import (
     population_evolvability,
 )
 from nichechain.landscape.dissimila import QUANTILES, Dissimila, find_dissimila
-from nichechain.landscape.genotypes import GenotypeMeasures, measure, measure_genotypes, niches_of
+from nichechain.landscape.genotypes import GenotypeMeasures, measure, measure_genotypes
 from nichechain.landscape.measures import (
     MEASURES,
     LocalMeasures,
@@ -57,7 +57,6 @@ __all__ = [
     "measure_behaviors",
     "measure_genotypes",
     "niche_table",
-    "niches_of",
     "one_hot_evolvability",
     "population_course",
     "population_evolvability",

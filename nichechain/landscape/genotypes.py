@@ -8,11 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from nichechain.births.table import NONE
 from nichechain.core.checks import as_floats
 from nichechain.core.errors import NichechainError
 from nichechain.core.randomness import Purpose
-from nichechain.domains.base import Domain, Evaluation, check_genotypes
+from nichechain.domains.base import Domain, check_genotypes
 from nichechain.landscape.behaviors import EPSILON
 from nichechain.landscape.measures import check_sample_size, measure_behaviors
 from nichechain.variation import Mutation
@@ -149,12 +148,3 @@ def make_offspring(
     The i-th child of every parent (G, P) is made with the same noise, whatever else is measured.
     """
     return litters(mutate, Purpose.OFFSPRING, parents, seed, sample_size).grow()
-
-
-def niches_of(evaluation: Evaluation, niches: Niches | None) -> NDArray[np.int64]:
-    """State of each evaluated genotype (N,): ``births.NONE`` where it failed or nothing is gridded."""
-    state = np.full(len(evaluation), NONE, np.int64)
-    if niches is not None:
-        fine = ~evaluation.failed
-        state[fine] = niches.of(evaluation.behavior[fine])
-    return state

@@ -21,7 +21,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from nichechain import births
-from nichechain.births.table import NONE, Offspring
+from nichechain.births.table import NONE, Offspring, niches_of
 from nichechain.core.errors import NichechainError
 from nichechain.core.randomness import Purpose, keyed
 from nichechain.domains.base import Domain, Evaluation
@@ -271,8 +271,7 @@ class MapElites:
     ) -> pa.Table:
         """The births of a step, of which those with a slot are of lineages and have a genotype each."""
         fine = ~evaluation.failed
-        niche = np.full(len(offspring), NONE, np.int64)
-        niche[fine] = self._niches.of(evaluation.behavior[fine])
+        niche = niches_of(evaluation, self._niches)
         keys = self._keys(offspring.uid, evaluation.objective)
         accepted = np.zeros(len(offspring), bool)
         accepted[fine] = self._archive.offer(niche[fine], keys[fine])

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nichechain.archive.archive import Archive
-from nichechain.births.table import NONE
+from nichechain.births.table import NONE, niches_of
 from nichechain.chain.model import NicheChain
 from nichechain.core.checks import check_at_least, check_seed, check_whole
 from nichechain.core.errors import NichechainError
@@ -170,11 +170,7 @@ def run_lineages(
     mutate, niches = archive.mutate, archive.niches
 
     def born(children: Unborn) -> Ints:
-        evaluation = executor.evaluate(archive.domain, children, on_done)
-        state = np.full(len(children), NONE, np.int64)
-        fine = ~evaluation.failed
-        state[fine] = niches.of(evaluation.behavior[fine])
-        return state
+        return niches_of(executor.evaluate(archive.domain, children, on_done), niches)
 
     states = np.full((len(elites), lineages, l), NONE, np.int64)
     # Elite and number of each lineage under way, its latest genotype, and where that stands among them.

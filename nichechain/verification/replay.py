@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from nichechain.births.table import NONE
+from nichechain.births.table import NONE, niches_of
 from nichechain.core.randomness import Purpose, keyed
 from nichechain.domains.base import Domain, Evaluation
 from nichechain.execution import Executor
@@ -249,8 +249,7 @@ def check_evaluations(
     outcome = recorded.failed != again.failed
     outcome |= np.array([a != b for a, b in zip(recorded.reasons, again.reasons, strict=True)], bool)
     both = ~recorded.failed & ~again.failed
-    landed = np.full(len(uids), NONE, np.int64)
-    landed[~again.failed] = niches.of(again.behavior[~again.failed])
+    landed = niches_of(again, niches)
 
     def check(name: str, was: NDArray[np.float64], now: NDArray[np.float64]) -> Check:
         apart = largest_difference(was[both], now[both])

@@ -14,13 +14,13 @@ import pyarrow as pa
 from numpy.typing import ArrayLike, NDArray
 
 from nichechain import births
-from nichechain.births.table import NONE, Offspring
+from nichechain.births.table import NONE, Offspring, niches_of
 from nichechain.core.checks import as_floats, as_whole
 from nichechain.core.errors import NichechainError
 from nichechain.core.randomness import Purpose, keyed
 from nichechain.domains.base import Domain, Evaluation
 from nichechain.execution import Executor, evaluate_rows
-from nichechain.landscape import niches_of, population_evolvability
+from nichechain.landscape import population_evolvability
 from nichechain.niches import Niches
 from nichechain.variation import Mutation
 from nichechain.variation.unborn import Unborn

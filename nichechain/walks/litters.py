@@ -10,10 +10,9 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from nichechain import births
-from nichechain.births.table import NONE, Offspring
+from nichechain.births.table import NONE, Offspring, niches_of
 from nichechain.core.randomness import Purpose
 from nichechain.domains.base import Evaluation
-from nichechain.landscape import niches_of
 from nichechain.niches import Niches
 from nichechain.variation import Mutation
 from nichechain.variation.unborn import Unborn

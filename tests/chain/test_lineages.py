@@ -181,3 +181,12 @@ def test_a_law_is_the_same_whenever_it_is_fitted():
     again = fitted_law(replace(posterior, law=None))
     assert again.stay == posterior.law.stay
     np.testing.assert_array_equal(again.weights, posterior.law.weights)
+
+
+def test_a_law_taken_as_known_is_drawn_as_its_middle():
+    law = estimate(counted(30, stay=0.5, concentration=20.0)).posterior.law
+    for seed in range(5):
+        stay, concentration = law.taken_as_known().drawn(np.random.default_rng(seed))
+        assert stay == law.stay
+        assert concentration == pytest.approx(law.concentration, rel=1e-12)
+    assert len({law.drawn(np.random.default_rng(seed)) for seed in range(5)}) == 5

@@ -9,7 +9,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from nichechain.archive.archive import Archive
-from nichechain.births.table import NONE
+from nichechain.births.table import NONE, niches_of
 from nichechain.core.randomness import Purpose, keyed
 from nichechain.core.ranks import rank_correlation
 from nichechain.evolvability.coverage import rarefied_coverage
@@ -159,8 +159,7 @@ def _offspring_niches(
         return float("nan")
     unborn = litters(archive.mutate, Purpose.OFFSPRING, archive.elites.genotype[chosen], seed, offspring)
     evaluation = executor.evaluate(archive.domain, unborn, on_done)
-    landed = np.full(len(unborn), NONE, np.int64)
-    landed[~evaluation.failed] = niches.of(evaluation.behavior[~evaluation.failed])
+    landed = niches_of(evaluation, niches)
     found = []
     for row in landed.reshape(chosen.size, offspring):
         counts = np.bincount(row[row != NONE], minlength=niches.states)
