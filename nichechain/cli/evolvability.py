@@ -232,8 +232,8 @@ def _best(command: EvolvabilityCommand, chain: NicheChain) -> pd.DataFrame:
     ranked = np.flatnonzero(births >= command.min_births)
     _check_enough(ranked.size, command)
     draws = 1 if chain.posterior is None else command.draws
-    with progress.counting(draws, "draws of T") as tell:
-        scores = answer_for_niches(chain, question, roots=ranked, tell=tell)
+    with progress.adding(draws, "draws of T") as tell:
+        scores = answer_for_niches(chain, question, roots=ranked, on_done=tell)
     ranking = scores.ranking(chain, min_births=command.min_births)
     frame = ranking.head(command.top or 10).copy()
     frame.insert(2, "root", "niche")

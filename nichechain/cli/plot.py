@@ -150,8 +150,8 @@ def _scores(command: PlotCommand, chain: NicheChain, draws: int | None = None) -
     from nichechain.evolvability.question import DRAWS, Question
 
     question = Question(command.l, command.lineages, draws=draws or DRAWS)
-    with progress.counting(1 if chain.posterior is None else question.draws, "draws of T") as tell:
-        return answer_for_niches(chain, question, tell=tell)
+    with progress.adding(1 if chain.posterior is None else question.draws, "draws of T") as tell:
+        return answer_for_niches(chain, question, on_done=tell)
 
 
 def _draw(command: PlotCommand, archive: Archive, ax: Axes) -> None:

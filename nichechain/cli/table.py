@@ -70,7 +70,7 @@ def run(arguments: Sequence[str]) -> int:
     Question(command.l, command.lineages)
     archive = parsing.seen(load(command.path), command.steps)
     draws = 1 if command.estimator == "mle" else command.draws
-    with progress.counting(draws, "draws of T") as tell:
+    with progress.adding(draws, "draws of T") as tell:
         frame = niche_table(
             archive,
             l=command.l,
@@ -79,7 +79,7 @@ def run(arguments: Sequence[str]) -> int:
             children=command.children,
             draws=command.draws,
             seed=command.seed,
-            tell=tell,
+            on_done=tell,
         )
     column = command.by.replace("-", "_")
     frame = frame.sort_values(column, ascending=command.by == "niche", kind="stable")

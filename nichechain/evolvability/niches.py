@@ -153,7 +153,7 @@ def answer_for_niches(
     question: Question,
     *,
     roots: Ints | None = None,
-    tell: Callable[[int], None] | None = None,
+    on_done: Callable[[int], None] | None = None,
 ) -> NicheEvolvability:
     """What :func:`niche_evolvability` answers to a question that has been checked.
 
@@ -163,14 +163,14 @@ def answer_for_niches(
     question : Question
     roots : (m,) int64 array, optional
         The niches that are asked for, where not all: others have NaN.
-    tell : callable, optional
-        Told how many draws of T are done.
+    on_done : callable, optional
+        Told how many more draws of T are done.
     """
     n, lineages = chain.n_niches, question.lineages
     asked = np.arange(n) if roots is None else roots
     question.warn_if_long(chain, asked.size)
     if question.by_urns(chain):
-        return _by_urns(chain, question, asked, tell)
+        return _by_urns(chain, question, asked, on_done)
     size = question.repeats_of_each(chain)
     own = asked if question.root_counts else None
 
@@ -199,15 +199,7 @@ def answer_for_niches(
         ]
         return np.mean(sampled, axis=1), np.array([standard_error(walks) for walks in sampled]), False
 
-    done = 0
-
-    def count(more: int) -> None:
-        nonlocal done
-        done += more
-        if tell is not None:
-            tell(done)
-
-    found = side_by_side(on_draw, range(question.number_of_samples(chain)), count)
+    found = side_by_side(on_draw, range(question.number_of_samples(chain)), on_done)
     means, errors, full = zip(*found, strict=True)
     saturated = any(full)
     figures = summary(np.array(means), np.array(errors), spread_of(chain), n)
@@ -244,10 +236,10 @@ def _of_all(
 
 
 def _by_urns(
-    chain: NicheChain, question: Question, asked: Ints, tell: Callable[[int], None] | None
+    chain: NicheChain, question: Question, asked: Ints, on_done: Callable[[int], None] | None
 ) -> NicheEvolvability:
     assert chain.posterior is not None
-    found = simulated_coverage(chain.posterior, question, [question.lineages], roots=asked, tell=tell)
+    found = simulated_coverage(chain.posterior, question, [question.lineages], roots=asked, on_done=on_done)
     value, error, low, high = found.summary()
     figures = value, error, *widened(value, low, high, spread_of(chain), chain.n_niches)
     # Where nothing is impossible, lineages without end visit every niche.

@@ -82,7 +82,7 @@ def simulated_coverage(
     *,
     roots: Ints | None = None,
     offspring: Floats | None = None,
-    tell: Callable[[int], None] | None = None,
+    on_done: Callable[[int], None] | None = None,
 ) -> Simulated:
     """Coverage of lineages on draws of T that are made as they are needed.
 
@@ -97,8 +97,8 @@ def simulated_coverage(
         States that roots stand in.
     offspring : (S,) float64 array, optional
         D: where the children of a single root are. Give either this or ``roots``.
-    tell : callable, optional
-        Told how many draws are done.
+    on_done : callable, optional
+        Told how many more draws are done.
 
     Returns
     -------
@@ -134,15 +134,7 @@ def simulated_coverage(
             )
         return draw
 
-    done = 0
-
-    def count(more: int) -> None:
-        nonlocal done
-        done += more
-        if tell is not None:
-            tell(done)
-
-    side_by_side(simulate, range(question.draws), count)
+    side_by_side(simulate, range(question.draws), on_done)
     return Simulated(coverage, noise)
 
 

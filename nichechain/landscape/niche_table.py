@@ -46,7 +46,7 @@ def niche_table(
     children: int = FEWEST_CHILDREN,
     draws: int = DRAWS,
     seed: int = 0,
-    tell: Callable[[int], None] | None = None,
+    on_done: Callable[[int], None] | None = None,
 ) -> pd.DataFrame:
     """What is known of every niche that births fell in, one row each.
 
@@ -58,8 +58,8 @@ def niche_table(
     estimator : {"empirical-bayes", "dirichlet", "mle"}
     children : int
         So many recorded children must an elite have for its r*, at least 2.
-    tell : callable, optional
-        Told how many draws of T are done.
+    on_done : callable, optional
+        Told how many more draws of T are done.
 
     Returns
     -------
@@ -102,7 +102,7 @@ def niche_table(
     births = archive.births()
     frame = frame.join(_curiosity(births), on="niche")
     if there.size:
-        scores = answer_for_niches(chain, question, roots=there, tell=tell)
+        scores = answer_for_niches(chain, question, roots=there, on_done=on_done)
         for name in ("value", "low", "high"):
             frame["evolvability" if name == "value" else name] = getattr(scores, name)[there]
     else:

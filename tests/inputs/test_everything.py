@@ -220,7 +220,7 @@ EXEMPT: dict[tuple[str, str], str] = {
         ("validation.contrast.contrast", "on_done", _WITHIN),
         ("validation.grid_size.sweep", "on_done", _WITHIN),
         ("validation.stability.rank_stability", "on_done", _WITHIN),
-        ("landscape.niche_table.niche_table", "tell", _WITHIN),
+        ("landscape.niche_table.niche_table", "on_done", _WITHIN),
         ("evolvability.elites.elite_evolvability", "on_done", _WITHIN),
         ("evolvability.genotypes.genotype_evolvability", "on_done", _WITHIN),
         ("evolvability.reach.reach", "on_done", _WITHIN),
