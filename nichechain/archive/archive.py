@@ -16,7 +16,7 @@ from nichechain.archive import read
 from nichechain.archive.trust import check_trusted
 from nichechain.births.orphans import orphan_note
 from nichechain.chain import NicheChain, TransitionCounts, estimate
-from nichechain.chain.filters import counts_of, within_steps
+from nichechain.chain.filters import COUNTED, counts_of, within_steps
 from nichechain.core.errors import ArchiveError, NichechainError
 from nichechain.core.notebook import facts_table
 from nichechain.core.suggestions import did_you_mean
@@ -283,7 +283,7 @@ class Archive:
     ) -> TransitionCounts:
         """Some of the births from niche to niche, see :func:`nichechain.chain.filters.counts_of`."""
         return counts_of(
-            self.table(whole=steps is not None),
+            self.table(list(COUNTED), whole=steps is not None),
             self.niches,
             run=run,
             steps=steps,

@@ -118,7 +118,7 @@ class BaseMeasure:
         mixed: Floats = self.weights @ self.components(parent, child)
         if self.near is not None and parent.size:
             mixed *= self.shared[parent]
-            mixed += np.asarray(self.near.matrix[parent, child]).ravel()
+            mixed += self.near.at(parent, child)
         return mixed
 
     def rows(self, parent: Ints) -> Floats:

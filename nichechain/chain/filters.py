@@ -11,6 +11,9 @@ from nichechain.chain.counts import TransitionCounts
 from nichechain.core.errors import NichechainError
 from nichechain.niches import Niches
 
+COUNTED = ("run", "uid", "parent_uid", "parent_niche", "child_niche", "step", "accepted", LINEAGE)
+"""Columns of births that counts are made of."""
+
 
 def counts_of(
     births: pa.Table,

@@ -69,10 +69,10 @@ class Neighbours:
         self.states, self.niches = niches.states, len(niches)
         self.parent, self.child = parent, child
         self.offsets = list(_offsets(niches, parent, child))
-        pair = parent * self.states + child
+        self._pair = parent * self.states + child
         # Of all that is said, what is said of pairs that have births: whose words, and to which pair.
         self._heard = [
-            [_seen(pair, *self.words(kind, offset)) for offset in self.offsets]
+            [_seen(self._pair, *self.words(kind, offset)) for offset in self.offsets]
             for kind in (_LANDING, _MOVING)
         ]
 
@@ -84,13 +84,25 @@ class Neighbours:
             column = np.where(column < self.niches, column + offset.shift, column)
         return source, (self.parent[source] + offset.shift) * self.states + column
 
+    def place(self, parent: Ints, child: Ints) -> Ints:
+        """Which pair it is, (N,), or -1 where there is none, or no such niches."""
+        if not self._pair.size:
+            return np.full(parent.size, -1)
+        code = parent * self.states + child
+        place = np.minimum(np.searchsorted(self._pair, code), self._pair.size - 1)
+        known = (self._pair[place] == code) & (child >= 0) & (child < self.states)
+        return np.where(known, place, -1)
+
     def said(self, kind: int, births: Floats) -> Floats:
         """Births that each niche hears of through each offset, weighted, (K, S)."""
         told = np.zeros((len(self.offsets), self.states))
+        speakers, first = np.unique(self.parent, return_index=True)
         for row, offset in zip(told, self.offsets, strict=True):
-            heard = np.bincount(self.parent, births * offset.pairs(kind), self.states)
+            if not speakers.size:
+                break
+            heard = np.add.reduceat(births * offset.pairs(kind), first)
             here = np.flatnonzero(heard)
-            row[here + offset.shift] = offset.weight * heard[here]
+            row[speakers[here] + offset.shift] = offset.weight * heard[here]
         return told
 
     def shares(self, landing: Floats, moving: Floats) -> Floats:
@@ -176,22 +188,52 @@ class NearRows:
         data = np.bincount(entry, np.concatenate(parts), column.size)
         return sparse.csr_array((data, column, start), shape=(states, states))
 
+    def at(self, parent: Ints, child: Ints) -> Floats:
+        """Some entries of it, (N,), without the others."""
+        near, kinds = self.neighbours, (_LANDING, _MOVING)
+        found = np.zeros(parent.size)
+        share = self.weights[:, None] / (self._said.sum(axis=1) + _IMAGINARY)
+        for kind, offset in product(kinds, near.offsets):
+            # Whose children would say it from there: a pair that speaks elsewhere is not told here.
+            speaker = parent - offset.shift
+            column = child
+            if kind == _MOVING:
+                moved = child - offset.shift
+                column = np.where(child >= near.niches, child, np.where(moved < near.niches, moved, -1))
+            pair = near.place(speaker, column)
+            there = np.flatnonzero(pair >= 0)
+            there = there[offset.pairs(kind)[pair[there]]]
+            births = self.births[kind, pair[there]]
+            found[there] += offset.weight * births * share[kind, parent[there]]
+        return found
+
     def sample(self, rows: Ints, rng: np.random.Generator) -> Ints:
         """A column for each of some rows (N,) that it is a part of."""
         from nichechain.chain import neighbours_steps
 
-        offsets = self.neighbours.offsets
+        near = self.neighbours
         drawn = np.empty(rows.size, np.int64)
         neighbours_steps.draw(
-            (self._through.reshape(-1, self.neighbours.states), self.mass),
-            np.array([offset.shift for offset in offsets]),
-            self.neighbours.moves,
-            (self.neighbours.starts, self.neighbours.child, self.births),
-            self.neighbours.niches,
+            self._voices,
+            np.array([offset.shift for offset in near.offsets]),
+            near.moves,
+            (near.starts, near.child, self._upto),
+            near.niches,
             (rows, rng.random((rows.size, 2))),
             drawn,
         )
         return drawn
+
+    @cached_property
+    def _voices(self) -> Floats:
+        """How much of each row comes through the first kinds and offsets, (S, 2 K)."""
+        through = self._through.reshape(-1, self.neighbours.states)
+        return np.ascontiguousarray(np.cumsum(through, axis=0).T)
+
+    @cached_property
+    def _upto(self) -> Floats:
+        """Births of the first pairs, of either kind, (2, E + 1)."""
+        return np.concatenate([np.zeros((2, 1)), np.cumsum(self.births, axis=1)], axis=1)
 
     @cached_property
     def _said(self) -> Floats:

@@ -8,38 +8,37 @@ from __future__ import annotations
 from typing import Any
 
 import numba
+import numpy as np
+
+
+@numba.njit(nogil=True, inline="always")
+def _below(upto: Any, wanted: Any) -> Any:
+    """The part that a number below the whole lies in, the last that is anything where rounding says none."""
+    place = np.searchsorted(upto, wanted, "right")
+    return place if place < upto.size else np.searchsorted(upto, upto[-1], "left")
 
 
 @numba.njit(nogil=True, cache=True)
-def draw(said: Any, shift: Any, moves: Any, pairs: Any, niches: Any, asked: Any, drawn: Any) -> None:
+def draw(voices: Any, shift: Any, moves: Any, pairs: Any, niches: Any, asked: Any, drawn: Any) -> None:
     """Write a column for each row that is asked for: whose words are taken, then which birth's."""
-    through, mass = said
-    start, child, births = pairs
+    start, child, upto = pairs
     rows, uniform = asked
     offsets = shift.size
     for k in range(rows.size):
-        row = rows[k]
-        left = uniform[k, 0] * mass[row]
-        voice = -1
-        for v in range(2 * offsets):
-            if through[v, row] > 0.0:
-                voice = v
-                left -= through[v, row]
-                if left < 0.0:
-                    break
+        said = voices[rows[k]]
+        voice = _below(said, uniform[k, 0] * said[-1])
         kind, offset = voice // offsets, voice % offsets
-        speaker = row - shift[offset]
-        total = 0.0
-        for e in range(start[speaker], start[speaker + 1]):
-            if kind == 0 or moves[offset, e]:
-                total += births[kind, e]
-        left = uniform[k, 1] * total
-        chosen = -1
-        for e in range(start[speaker], start[speaker + 1]):
-            if (kind == 0 or moves[offset, e]) and births[kind, e] > 0.0:
-                chosen = e
-                left -= births[kind, e]
-                if left < 0.0:
-                    break
-        column = child[chosen]
+        speaker = rows[k] - shift[offset]
+        begin, end = start[speaker], start[speaker + 1]
+        before, births = upto[kind, begin], upto[kind, begin + 1 : end + 1]
+        wanted = before + uniform[k, 1] * (births[-1] - before)
+        chosen = _below(births, wanted)
+        if kind == 1 and not moves[offset, begin + chosen]:
+            # One that this row does not hear of: one that it does, by what is left of the number.
+            below = births[chosen - 1] if chosen else before
+            left = min((wanted - below) / (births[chosen] - below), 1.0)
+            heard = np.diff(upto[kind, begin : end + 1]) * moves[offset, begin:end]
+            heard = np.cumsum(heard)
+            chosen = _below(heard, left * heard[-1])
+        column = child[begin + chosen]
         drawn[k] = column + shift[offset] if kind == 1 and column < niches else column

@@ -79,7 +79,10 @@ class UrnRows:
         return added._scaled(total / (total + more))
 
     def _scaled(self, factor: Floats) -> UrnRows:
-        return UrnRows((sparse.diags_array(factor) @ self.weights).tocsr(), factor * self.strength)
+        weights = self.weights
+        data = weights.data * np.repeat(factor, np.diff(weights.indptr))
+        scaled = sparse.csr_array((data, weights.indices, weights.indptr), shape=weights.shape)
+        return UrnRows(scaled, factor * self.strength)
 
 
 class Urns:

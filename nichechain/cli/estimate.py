@@ -139,10 +139,9 @@ def _estimate(command: EstimateCommand, archive: Archive) -> None:
 def _compare(command: EstimateCommand, archive: Archive) -> None:
     from nichechain.validation.held_out import compare_estimators
 
-    with progress.spinner("holding out elites"):
-        found = compare_estimators(
-            archive.counts, folds=5 if command.folds is None else command.folds, seed=command.seed
-        )
+    folds = 5 if command.folds is None else command.folds
+    with progress.adding(folds, "folds of elites") as tell:
+        found = compare_estimators(archive.counts, folds=folds, seed=command.seed, on_done=tell)
     frame = found.to_frame()
     if command.format != "table":
         about = {"folds": found.folds, "elites": found.elites, "seed": found.seed}

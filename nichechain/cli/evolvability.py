@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from nichechain.archive.archive import Archive
     from nichechain.chain import NicheChain
 
+_TOP = 10
 _LABELS = {"posterior": "90 % interval", "prior": "prior band", "bootstrap": "90 % bootstrap"}
 
 
@@ -202,7 +203,7 @@ def _best_elites(command: EvolvabilityCommand, archive: Archive, chain: NicheCha
         ranking = elite_evolvability(archive, chain=chain, on_done=tell, **asked)
     ranking = ranking[ranking["births"] >= command.min_births]
     _check_enough(len(ranking), command)
-    frame = ranking.head(command.top or 10).copy()
+    frame = ranking.head(command.top or _TOP).copy()
     frame.insert(2, "root", "elite")
     for name in ("l", "lineages", "convention"):
         frame[name] = getattr(command, name)
@@ -233,9 +234,10 @@ def _best(command: EvolvabilityCommand, chain: NicheChain) -> pd.DataFrame:
     _check_enough(ranked.size, command)
     draws = 1 if chain.posterior is None else command.draws
     with progress.adding(draws, "draws of T") as tell:
-        scores = answer_for_niches(chain, question, roots=ranked, on_done=tell)
+        best = command.top or _TOP
+        scores = answer_for_niches(chain, question, roots=ranked, best=best, on_done=tell)
     ranking = scores.ranking(chain, min_births=command.min_births)
-    frame = ranking.head(command.top or 10).copy()
+    frame = ranking.head(command.top or _TOP).copy()
     frame.insert(2, "root", "niche")
     for name in ("l", "lineages", "method", "convention", "estimator", "saturated"):
         frame[name] = getattr(scores, name)

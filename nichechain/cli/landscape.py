@@ -165,11 +165,13 @@ def _results(
     """The table, with what births say of each niche beside it, and the summary."""
     import numpy as np
 
-    from nichechain.evolvability import niche_evolvability
+    from nichechain.evolvability.niches import answer_for_niches
+    from nichechain.evolvability.question import Question
 
     chain = archive.chain()
-    with progress.spinner("l-evolvability of the niches"):
-        scores = niche_evolvability(chain, l=command.l, lineages=command.lineages, seed=command.seed)
+    question = Question(command.l, command.lineages, seed=command.seed)
+    with progress.adding(question.number_of_samples(chain), "draws of T") as tell:
+        scores = answer_for_niches(chain, question, on_done=tell)
     assert scores.births is not None
     compared = np.where(scores.births >= command.min_births, scores.value, np.nan)
     inside = found.state < len(archive.niches)

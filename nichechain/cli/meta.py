@@ -49,17 +49,20 @@ def show(command: EvolvabilityCommand, archive: Archive) -> int:
     assert command.elite is not None
     assert command.meta is not None
     elite = archive.elite(parse_niche(command.elite, "--elite"))
+    offspring = _OFFSPRING if command.offspring is None else command.offspring
+    evaluations = max(1, command.meta * (1 + offspring))
     with (
         execution.make(command.workers, command.cache_memory) as executor,
-        progress.spinner("evaluating two generations"),
+        progress.adding(evaluations, "evaluations") as tell,
     ):
         found = meta_evolvability(
             archive,
             elite,
             children=command.meta,
-            offspring=_OFFSPRING if command.offspring is None else command.offspring,
+            offspring=offspring,
             seed=command.seed,
             executor=executor,
+            on_done=tell,
         )
     values = {name: value for name, value in asdict(found).items() if name != "of_children"}
     label = archive.niches.label(elite.state)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -63,6 +64,7 @@ def meta_evolvability(
     lineages: int | None = None,
     seed: int = 0,
     executor: Executor | None = None,
+    on_done: Callable[[int], None] | None = None,
 ) -> MetaEvolvability:
     """How evolvable the offspring of a genotype are: two generations are evaluated, none is modelled.
 
@@ -82,7 +84,9 @@ def meta_evolvability(
     seed : int
         Children are those of the same seed that :func:`genotype_evolvability` evaluates.
     executor : Executor, optional
-        Where to evaluate; by default here.
+        Where to evaluate; by default here, all of a generation at once.
+    on_done : callable, optional
+        Told how many more have been evaluated, of ``children * (1 + offspring)`` where none fails.
 
     Returns
     -------
@@ -114,7 +118,11 @@ def meta_evolvability(
 
     def landed(unborn: Unborn) -> Ints:
         domain = archive.domain
-        found = domain.evaluate(unborn.grow()) if executor is None else executor.evaluate(domain, unborn)
+        if executor is not None:
+            return niches_of(executor.evaluate(domain, unborn, on_done), archive.niches)
+        found = domain.evaluate(unborn.grow())
+        if on_done is not None:
+            on_done(len(unborn))
         return niches_of(found, archive.niches)
 
     first = litters(mutate, Purpose.OFFSPRING, np.asarray(elite.genotype)[None], seed, children)

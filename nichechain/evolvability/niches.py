@@ -23,7 +23,7 @@ from nichechain.evolvability.averaging import (
 from nichechain.evolvability.coverage import expected_coverage, sampled_coverage
 from nichechain.evolvability.question import DRAWS, Convention, Method, Question, Root, dense
 from nichechain.evolvability.results import Evolvability, NicheEvolvability
-from nichechain.evolvability.urns import simulated_coverage
+from nichechain.evolvability.urns import best_coverage, simulated_coverage
 from nichechain.execution.side_by_side import side_by_side
 from nichechain.niches import Niche
 
@@ -153,6 +153,7 @@ def answer_for_niches(
     question: Question,
     *,
     roots: Ints | None = None,
+    best: int | None = None,
     on_done: Callable[[int], None] | None = None,
 ) -> NicheEvolvability:
     """What :func:`niche_evolvability` answers to a question that has been checked.
@@ -163,6 +164,8 @@ def answer_for_niches(
     question : Question
     roots : (m,) int64 array, optional
         The niches that are asked for, where not all: others have NaN.
+    best : int, optional
+        How many of the best are wanted, where not all: others may have NaN.
     on_done : callable, optional
         Told how many more draws of T are done.
     """
@@ -170,7 +173,7 @@ def answer_for_niches(
     asked = np.arange(n) if roots is None else roots
     question.warn_if_long(chain, asked.size)
     if question.by_urns(chain):
-        return _by_urns(chain, question, asked, on_done)
+        return _by_urns(chain, question, asked, best, on_done)
     size = question.repeats_of_each(chain)
     own = asked if question.root_counts else None
 
@@ -236,10 +239,19 @@ def _of_all(
 
 
 def _by_urns(
-    chain: NicheChain, question: Question, asked: Ints, on_done: Callable[[int], None] | None
+    chain: NicheChain,
+    question: Question,
+    asked: Ints,
+    best: int | None,
+    on_done: Callable[[int], None] | None,
 ) -> NicheEvolvability:
     assert chain.posterior is not None
-    found = simulated_coverage(chain.posterior, question, [question.lineages], roots=asked, on_done=on_done)
+    if best is None:
+        size = [question.lineages]
+        found = simulated_coverage(chain.posterior, question, size, roots=asked, on_done=on_done)
+    else:
+        left, found = best_coverage(chain.posterior, question, asked, best, on_done)
+        asked = asked[left]
     value, error, low, high = found.summary()
     figures = value, error, *widened(value, low, high, spread_of(chain), chain.n_niches)
     # Where nothing is impossible, lineages without end visit every niche.

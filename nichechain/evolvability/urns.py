@@ -28,6 +28,8 @@ Ints = NDArray[np.int64]
 # Lineages of a root are 2 to 40 times as many as are asked for: halves tell the noise, more lower it.
 # Descendants of all roots up to which a draw has more.
 _WORTHWHILE = 200_000
+# Draws after which only what may be among the best is followed further.
+_FEW_DRAWS = 8
 # Descendants that are kept at once, by each thread.
 _DESCENDANTS = 2_000_000
 
@@ -82,6 +84,7 @@ def simulated_coverage(
     *,
     roots: Ints | None = None,
     offspring: Floats | None = None,
+    numbers: range | None = None,
     on_done: Callable[[int], None] | None = None,
 ) -> Simulated:
     """Coverage of lineages on draws of T that are made as they are needed.
@@ -97,6 +100,8 @@ def simulated_coverage(
         States that roots stand in.
     offspring : (S,) float64 array, optional
         D: where the children of a single root are. Give either this or ``roots``.
+    numbers : range, optional
+        Which draws; by default all that are asked for.
     on_done : callable, optional
         Told how many more draws are done.
 
@@ -115,10 +120,12 @@ def simulated_coverage(
     moves = question.steps - counts_first
     lineages = max(sizes) * int(np.clip(_WORTHWHILE // (m * question.steps * max(sizes)), 2, 40))
     at_once = max(1, _DESCENDANTS // (lineages * (moves + 1)))
-    coverage = np.empty((question.draws, m, len(sizes)))
+    asked = range(question.draws) if numbers is None else numbers
+    coverage = np.empty((len(asked), m, len(sizes)))
     noise = np.empty_like(coverage)
 
-    def simulate(draw: int) -> int:
+    def simulate(place: int) -> int:
+        draw = asked[place]
         rng = keyed(question.seed, Purpose.WALKS, draw)
         urns = urns_of(posterior, keyed(question.seed, Purpose.POSTERIOR, draw))
         for start in range(0, m, at_once):
@@ -129,13 +136,63 @@ def simulated_coverage(
             else:
                 first = np.repeat(roots[block], lineages).reshape(-1, lineages)
             states = urns.walks(first.astype(np.int64), moves, rng, roots=roots is not None)
-            coverage[draw, block], noise[draw, block] = covered(
+            coverage[place, block], noise[place, block] = covered(
                 states[:, 0 if counts_first else lineages :], lineages, sizes, urns.niches
             )
-        return draw
+        return place
 
-    side_by_side(simulate, range(question.draws), on_done)
+    side_by_side(simulate, range(len(asked)), on_done)
     return Simulated(coverage, noise)
+
+
+def best_coverage(
+    posterior: DirichletPosterior,
+    question: Question,
+    roots: Ints,
+    best: int,
+    on_done: Callable[[int], None] | None = None,
+) -> tuple[Ints, Simulated]:
+    """The same for the best of many roots: whoever cannot be one of them is left out after a few draws.
+
+    Parameters
+    ----------
+    posterior, question, on_done
+        As in :func:`simulated_coverage`, for U of the question.
+    roots : (m,) int64 array
+    best : int
+        How many are wanted.
+
+    Returns
+    -------
+    (c,) int64 array and Simulated
+        Places in ``roots`` of those that may be among the best, and what all draws say of these.
+
+    Notes
+    -----
+    A root is left out if its mean over the first draws is below that of the last of the best by more
+    than three standard errors of each.
+    """
+    size = [question.lineages]
+    few = range(min(_FEW_DRAWS, question.draws))
+    first = simulated_coverage(posterior, question, size, roots=roots, numbers=few, on_done=on_done)
+    if len(few) < 2 or roots.size <= best:
+        left = np.arange(roots.size)
+    else:
+        drawn = first.coverage[:, :, 0]
+        error = drawn.std(axis=0, ddof=1) / math.sqrt(len(few))
+        # Few draws tell a spread badly.
+        margin = 3.0 * np.maximum(error, np.median(error))
+        mean = drawn.mean(axis=0)
+        worst = np.sort(mean - margin)[-best]
+        left = np.flatnonzero(mean + margin >= worst)
+    begun = Simulated(first.coverage[:, left], first.noise[:, left])
+    others = range(few.stop, question.draws)
+    if not others:
+        return left, begun
+    rest = simulated_coverage(posterior, question, size, roots=roots[left], numbers=others, on_done=on_done)
+    return left, Simulated(
+        np.concatenate([begun.coverage, rest.coverage]), np.concatenate([begun.noise, rest.noise])
+    )
 
 
 def covered(states: Ints, lineages: int, sizes: list[int], niches: int) -> tuple[Floats, Floats]:

@@ -86,7 +86,13 @@ class Comparison:
         return pd.DataFrame([asdict(row) for row in self.rows])
 
 
-def compare_estimators(counts: TransitionCounts, *, folds: int = 5, seed: int = 0) -> Comparison:
+def compare_estimators(
+    counts: TransitionCounts,
+    *,
+    folds: int = 5,
+    seed: int = 0,
+    on_done: Callable[[int], None] | None = None,
+) -> Comparison:
     """Hold out the children of a share of the elites, estimate T from the rest, foretell them.
 
     Parameters
@@ -99,6 +105,8 @@ def compare_estimators(counts: TransitionCounts, *, folds: int = 5, seed: int = 
         turns; at least 2.
     seed : int
         Of the division into folds.
+    on_done : callable, optional
+        Told how many more folds are done.
 
     Returns
     -------
@@ -131,6 +139,8 @@ def compare_estimators(counts: TransitionCounts, *, folds: int = 5, seed: int = 
         seen = counts_of_families(families[~out], counts)
         for name, fit in fits.items():
             foretold[name][out] = probability_of(fit(seen), parent[out], child[out])
+        if on_done is not None:
+            on_done(1)
     reference = next(iter(foretold.values()))
     rows = tuple(_judge(name, p, reference, weight, elite) for name, p in foretold.items())
     return Comparison(rows, folds, elites, seed)

@@ -52,8 +52,10 @@ def test_neighbours_say_what_a_loop_over_them_says():
     expected = _said_by_neighbours(PLANE, landing)
     neighbours = Neighbours(PLANE, i, j)
     np.testing.assert_allclose(neighbours.shares(births, births), expected[:, i, j], atol=1e-14)
-    rows = neighbours.rows(births, births, np.array([0.3, 0.5])).matrix.toarray()
-    np.testing.assert_allclose(rows, 0.3 * expected[0] + 0.5 * expected[1], atol=1e-14)
+    near = neighbours.rows(births, births, np.array([0.3, 0.5]))
+    np.testing.assert_allclose(near.matrix.toarray(), 0.3 * expected[0] + 0.5 * expected[1], atol=1e-14)
+    some = rng.integers(13, size=(2, 300))
+    np.testing.assert_allclose(near.at(*some), near.matrix.toarray()[*some], atol=1e-14)
     # A row's own births say nothing of it.
     landing[4] = 0.0
     alone = _said_by_neighbours(PLANE, landing)[:, 4]

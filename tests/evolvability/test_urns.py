@@ -13,7 +13,7 @@ from nichechain.evolvability import l_evolvability, niche_evolvability
 from nichechain.evolvability.coverage import rarefied_coverage
 from nichechain.evolvability.niches import answer_for_niches
 from nichechain.evolvability.question import MOST_EXACT, Question
-from nichechain.evolvability.urns import Simulated, simulated_coverage
+from nichechain.evolvability.urns import Simulated, best_coverage, simulated_coverage
 from nichechain.niches import GridNiches
 
 _BOUNDS = ((0.0, 1.0), (0.0, 1.0))
@@ -121,3 +121,34 @@ def test_scores_of_some_niches_are_those_of_all():
     )
     np.testing.assert_allclose(some.value[[1, 8]], every.value[[1, 8]], rtol=1e-13)
     assert np.isnan(some.value[0])
+
+
+def test_only_what_may_be_best_is_followed_to_the_end():
+    chain = estimate(_counts(births=4000), strength=3.0)
+    question, roots = Question(l=3, lineages=6, draws=60), np.arange(16)
+    exact = niche_evolvability(chain, l=3, lineages=6, draws=400, method="exact")
+    left, found = best_coverage(chain.posterior, question, roots, 2)
+    assert set(np.argsort(exact.value)[-2:]) <= set(left)
+    assert left.size < 16
+    assert found.coverage.shape == (60, left.size, 1)
+    value, error, *_ = found.summary()
+    assert (np.abs(value - exact.value[left]) < 4.5 * np.hypot(error, exact.standard_error[left])).all()
+    # Whoever asks for as many as there are gets them all, of as many draws.
+    everyone, again = best_coverage(chain.posterior, question, roots, 16)
+    np.testing.assert_array_equal(everyone, roots)
+    assert again.coverage.shape == (60, 16, 1)
+
+
+def test_a_copy_is_of_the_visit_that_its_number_says():
+    # No birth and no base: the number alone says which of the visits before is copied, the newest first.
+    from nichechain.chain.urn_steps import choose
+
+    rng = np.random.default_rng(0)
+    states = rng.integers(3, size=(4, 100))
+    uniform, origin = rng.random((4, 50)), np.empty((4, 50), np.int64)
+    nothing = np.zeros(4, np.int64)
+    choose(nothing, nothing, np.zeros(1), np.zeros(3), -1, states, 7, 50, uniform, origin)
+    for root in range(4):
+        for k in range(50):
+            alike = np.flatnonzero(states[root, 7 : 50 + k] == states[root, 50 + k]) + 7
+            assert origin[root, k] == alike[::-1][int(uniform[root, k] * alike.size)]

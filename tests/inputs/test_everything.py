@@ -224,6 +224,8 @@ EXEMPT: dict[tuple[str, str], str] = {
         ("evolvability.elites.elite_evolvability", "on_done", _WITHIN),
         ("evolvability.genotypes.genotype_evolvability", "on_done", _WITHIN),
         ("evolvability.reach.reach", "on_done", _WITHIN),
+        ("evolvability.meta.meta_evolvability", "on_done", _WITHIN),
+        ("validation.held_out.compare_estimators", "on_done", _WITHIN),
         ("evolvability.uncertainty.bootstrap_elites", "on_done", _WITHIN),
         ("evolvability.uncertainty.prior_sensitivity", "on_done", _WITHIN),
         ("plots.explorer.page.write_explorer", "on_done", _WITHIN),
