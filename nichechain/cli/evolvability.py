@@ -207,7 +207,7 @@ def _best_elites(command: EvolvabilityCommand, archive: Archive, chain: NicheCha
     frame.insert(2, "root", "elite")
     for name in ("l", "lineages", "convention"):
         frame[name] = getattr(command, name)
-    frame["method"], frame["estimator"] = "exact", chain.estimator
+    frame["estimator"] = chain.estimator
     return frame
 
 

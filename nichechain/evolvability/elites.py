@@ -16,8 +16,10 @@ from nichechain.core.errors import NichechainError
 from nichechain.core.randomness import Purpose, keyed
 from nichechain.evolvability.averaging import ENDLESS, SATURATED, spread_of, summary
 from nichechain.evolvability.coverage import LinearOperator, expected_coverage
+from nichechain.evolvability.niches import URNS, figures_of
 from nichechain.evolvability.question import DRAWS, Convention, Question, dense
-from nichechain.evolvability.record import draw_known, own_strength, recorded_children
+from nichechain.evolvability.record import own_strength, recorded_children
+from nichechain.evolvability.urns import Record, simulated_coverage
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -59,7 +61,7 @@ def elite_evolvability(
         One row per elite, the largest value first: ``niche`` and its label ``index``, ``uid``,
         ``depth``, ``value``, ``low``, ``high``, ``standard_error``; ``births`` behind the row of its niche
         (-1 where T is given), and ``recorded``, its own children. An elite without any has the value
-        of its niche. ``saturated`` is as in :class:`nichechain.Evolvability`.
+        of its niche. ``saturated`` and ``method`` are as in :class:`nichechain.Evolvability`.
 
     Raises
     ------
@@ -68,7 +70,7 @@ def elite_evolvability(
 
     Notes
     -----
-    What :func:`nichechain.genotype_evolvability` says of each with ``offspring=0``, in closed form, from
+    What :func:`nichechain.genotype_evolvability` says of each with ``offspring=0``, from
     the same draws of T but other draws of D. Probabilities of visits are computed once for all elites.
     """
     import pandas as pd
@@ -87,20 +89,22 @@ def elite_evolvability(
             "estimate it from the archive's births"
         )
     strength = own_strength(chain) if strength is None else strength
-    children = recorded_children(archive, elites.uid)
-    means, saturated = [], False
-    for number, drawn in enumerate(question.samples(chain, redraw=True, on_done=on_done)):
-        rng = keyed(seed, Purpose.FIRST_GENERATION, number)
-        known, shares = draw_known(children, rng, strength)
-        first: LinearOperator = _FirstRows(shares, 1.0 - known, drawn.rows, elites.niche)
-        if drawn.concentration is not None:
-            first = shares.toarray() + (1.0 - known)[:, None] * dense(drawn.children(elites.niche))
-        covered = expected_coverage(drawn.onward, first, question.steps, [lineages, ENDLESS], counted=n)
-        saturated |= bool(np.median(covered[:, 0] / np.maximum(covered[:, 1], 1e-300)) > SATURATED)
-        means.append(covered[:, 0])
-    value, error, low, high = summary(
-        np.array(means), np.zeros((len(means), len(elites))), spread_of(chain), n
-    )
+    record = Record(recorded_children(archive, elites.uid), strength)
+    if question.by_urns(chain):
+        assert chain.posterior is not None
+        found = simulated_coverage(
+            chain.posterior,
+            question,
+            [lineages],
+            roots=elites.niche,
+            record=record,
+            on_done=on_done,
+        )
+        value, error, low, high = figures_of(chain, found)
+        saturated = bool(np.median(value) > SATURATED * n)
+    else:
+        figures, saturated = _in_closed_form(chain, question, elites.niche, record, on_done)
+        value, error, low, high = figures
     births = np.full(n, -1) if chain.births is None else chain.births
     frame = pd.DataFrame(
         {
@@ -113,11 +117,34 @@ def elite_evolvability(
             "high": high,
             "standard_error": error,
             "births": births[elites.niche],
-            "recorded": np.asarray(children.sum(axis=1)).ravel(),
+            "recorded": np.asarray(record.children.sum(axis=1)).ravel(),
             "saturated": saturated,
+            "method": URNS if question.by_urns(chain) else "exact",
         }
     )
     return frame.sort_values("value", ascending=False, kind="stable").reset_index(drop=True)
+
+
+def _in_closed_form(
+    chain: NicheChain,
+    question: Question,
+    niches: NDArray[np.int64],
+    record: Record,
+    on_done: Callable[[int], None] | None,
+) -> tuple[tuple[Floats, Floats, Floats, Floats], bool]:
+    """Mean, error and bounds of genotypes in these niches, (K,) each, and whether most are saturated."""
+    n, means, saturated = chain.n_niches, [], False
+    for number, drawn in enumerate(question.samples(chain, redraw=True, on_done=on_done)):
+        known, shares = record.draw(keyed(question.seed, Purpose.FIRST_GENERATION, number))
+        first: LinearOperator = _FirstRows(shares, 1.0 - known, drawn.rows, niches)
+        if drawn.concentration is not None:
+            first = shares.toarray() + (1.0 - known)[:, None] * dense(drawn.children(niches))
+        covered = expected_coverage(
+            drawn.onward, first, question.steps, [question.lineages, ENDLESS], counted=n
+        )
+        saturated |= bool(np.median(covered[:, 0] / np.maximum(covered[:, 1], 1e-300)) > SATURATED)
+        means.append(covered[:, 0])
+    return summary(np.array(means), np.zeros((len(means), niches.size)), spread_of(chain), n), saturated
 
 
 @dataclass(frozen=True)

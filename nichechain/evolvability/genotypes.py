@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 
 from nichechain.chain.model import NicheChain
 from nichechain.core.checks import check_at_least, check_choice, check_positive
@@ -16,9 +17,11 @@ from nichechain.core.errors import NichechainError
 from nichechain.core.randomness import Purpose, keyed
 from nichechain.evolvability.averaging import Sample, one_root
 from nichechain.evolvability.coverage import rarefied_coverage
+from nichechain.evolvability.niches import one_by_urns
 from nichechain.evolvability.question import DRAWS, Convention, Method, Question, Root
 from nichechain.evolvability.record import draw_children, own_strength, recorded_children
 from nichechain.evolvability.results import Evolvability
+from nichechain.evolvability.urns import Record
 from nichechain.variation.unborn import litters
 
 if TYPE_CHECKING:
@@ -122,18 +125,15 @@ def genotype_evolvability(
 
     root = Root(chain, niche=elite.state)
     strength = own_strength(chain) if strength is None else strength
-
-    def sample(number: int) -> Sample:
-        drawn = question.sample(chain, number)
-        if not guessed:
-            return drawn.onward, counts / observed
-        rng = keyed(seed, Purpose.FIRST_GENERATION, number)
-        return drawn.onward, draw_children(counts, root.children(drawn), rng, strength)
-
-    # Where T is given, D is not, if it has to be guessed.
-    size = question.number_of_samples(chain, redraw=guessed)
-    repeats_of_each = question.repeats_of_each(chain, redraw=guessed)
-    result = one_root(chain, sample, size, question, repeats_of_each, on_done=on_done)
+    if question.by_urns(chain):
+        own = sparse.csr_array(counts[None])
+        if guessed:
+            result = one_by_urns(chain, root, question, record=Record(own, strength), on_done=on_done)
+        else:
+            begun = Root(chain, offspring=counts / observed)
+            result = one_by_urns(chain, begun, question, on_done=on_done)
+    else:
+        result = _one_in_closed_form(chain, root, question, counts, strength if guessed else None, on_done)
     result = replace(result, births=root.births, recorded=recorded, offspring=observed - recorded)
     if guessed and question.steps == 1 and not recorded and lineages <= observed:
         # No distribution has to be guessed: these are children, and there are enough of them.
@@ -142,6 +142,30 @@ def genotype_evolvability(
         result = replace(result, low=float(low), high=float(high))
         return replace(result, value=value, standard_error=0.0, method="rarefaction")
     return result
+
+
+def _one_in_closed_form(
+    chain: NicheChain,
+    root: Root,
+    question: Question,
+    counts: NDArray[np.int64],
+    strength: float | None,
+    on_done: Callable[[int], None] | None,
+) -> Evolvability:
+    """The answer for a genotype with such children: D is drawn where α is given, else their share."""
+
+    def sample(number: int) -> Sample:
+        drawn = question.sample(chain, number)
+        if strength is None:
+            return drawn.onward, counts / counts.sum()
+        rng = keyed(question.seed, Purpose.FIRST_GENERATION, number)
+        return drawn.onward, draw_children(counts, root.children(drawn), rng, strength)
+
+    # Where T is given, D is not, if it has to be guessed.
+    guessed = strength is not None
+    size = question.number_of_samples(chain, redraw=guessed)
+    repeats = question.repeats_of_each(chain, redraw=guessed)
+    return one_root(chain, sample, size, question, repeats, on_done=on_done)
 
 
 def _offspring_counts(

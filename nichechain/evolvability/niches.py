@@ -23,7 +23,7 @@ from nichechain.evolvability.averaging import (
 from nichechain.evolvability.coverage import expected_coverage, sampled_coverage
 from nichechain.evolvability.question import DRAWS, Convention, Method, Question, Root, dense
 from nichechain.evolvability.results import Evolvability, NicheEvolvability
-from nichechain.evolvability.urns import best_coverage, simulated_coverage
+from nichechain.evolvability.urns import Record, Simulated, best_coverage, simulated_coverage
 from nichechain.execution.side_by_side import side_by_side
 from nichechain.niches import Niche
 
@@ -102,11 +102,11 @@ def answer(
     root : Root
     question : Question
     on_done : callable, optional
-        Told how many more draws of T are done, in closed form.
+        Told how many more draws of T are done.
     """
     question.warn_if_long(chain)
     if question.by_urns(chain):
-        return replace(_one_by_urns(chain, root, question), births=root.births)
+        return replace(one_by_urns(chain, root, question, on_done=on_done), births=root.births)
     own = root.visited(question)
 
     def sample(number: int) -> Sample:
@@ -252,20 +252,33 @@ def _by_urns(
     else:
         left, found = best_coverage(chain.posterior, question, asked, best, on_done)
         asked = asked[left]
-    value, error, low, high = found.summary()
-    figures = value, error, *widened(value, low, high, spread_of(chain), chain.n_niches)
+    figures = figures_of(chain, found)
     # Where nothing is impossible, lineages without end visit every niche.
     saturated = bool(np.median(figures[0]) > SATURATED * chain.n_niches)
     return _of_all(chain, question, asked, figures, URNS, saturated)
 
 
-def _one_by_urns(chain: NicheChain, root: Root, question: Question) -> Evolvability:
+def figures_of(chain: NicheChain, found: Simulated) -> tuple[Floats, Floats, Floats, Floats]:
+    """Mean, standard error and bounds of simulated coverage, of elites of the chain's niches, (m,) each."""
+    value, error, low, high = found.summary()
+    return value, error, *widened(value, low, high, spread_of(chain), chain.n_niches)
+
+
+def one_by_urns(
+    chain: NicheChain,
+    root: Root,
+    question: Question,
+    *,
+    record: Record | None = None,
+    on_done: Callable[[int], None] | None = None,
+) -> Evolvability:
+    """The answer for one root of a chain of many states, or for a genotype in its niche with a record."""
     assert chain.posterior is not None
     start = {"offspring": root.distribution} if root.state is None else {"roots": np.array([root.state])}
-    found = simulated_coverage(chain.posterior, question, [question.lineages], **start)
-    means, errors, lowest, highest = found.summary()
-    bounds = widened(means, lowest, highest, spread_of(chain), chain.n_niches)
-    value, error, low, high = (float(figure[0]) for figure in (means, errors, *bounds))
+    found = simulated_coverage(
+        chain.posterior, question, [question.lineages], **start, record=record, on_done=on_done
+    )
+    value, error, low, high = (float(figure[0]) for figure in figures_of(chain, found))
     return Evolvability(
         value,
         error,

@@ -12,14 +12,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 
 from nichechain.chain.lineages import urns_of
 from nichechain.core.intervals import drawn_interval, no_interval
 from nichechain.core.randomness import Purpose, keyed
+from nichechain.evolvability.record import draw_known
 from nichechain.execution.side_by_side import side_by_side
 
 if TYPE_CHECKING:
     from nichechain.chain.posterior import DirichletPosterior
+    from nichechain.chain.urns import Urns
     from nichechain.evolvability.question import Question
 
 Floats = NDArray[np.float64]
@@ -77,6 +80,26 @@ class Simulated:
         return mean, np.sqrt(spread / len(drawn)), mean + kept * (low - mean), mean + kept * (high - mean)
 
 
+@dataclass(frozen=True)
+class Record:
+    """Where children of some genotypes are known to have landed.
+
+    Parameters
+    ----------
+    children : (m, S) scipy.sparse.csr_array of int64
+        How many in each state.
+    strength : float
+        α, how many children the row of T is worth beside them.
+    """
+
+    children: sparse.csr_array
+    strength: float
+
+    def draw(self, rng: np.random.Generator) -> tuple[Floats, sparse.csr_array]:
+        """The part of their first generation that these speak for, and how they divide it."""
+        return draw_known(self.children, rng, self.strength)
+
+
 def simulated_coverage(
     posterior: DirichletPosterior,
     question: Question,
@@ -84,6 +107,7 @@ def simulated_coverage(
     *,
     roots: Ints | None = None,
     offspring: Floats | None = None,
+    record: Record | None = None,
     numbers: range | None = None,
     on_done: Callable[[int], None] | None = None,
 ) -> Simulated:
@@ -100,6 +124,8 @@ def simulated_coverage(
         States that roots stand in.
     offspring : (S,) float64 array, optional
         D: where the children of a single root are. Give either this or ``roots``.
+    record : Record, optional
+        Of genotypes that stand in ``roots``: then all states that count come after the root's own.
     numbers : range, optional
         Which draws; by default all that are asked for.
     on_done : callable, optional
@@ -113,10 +139,11 @@ def simulated_coverage(
     -----
     Of M ≥ 2 U simulated lineages, U are drawn without replacement in expectation (Hurlbert 1971), which
     is unbiased for U lineages on the same T. Draw d comes from ``keyed(seed, Purpose.WALKS, d)``; roots
-    have draws of their own.
+    have draws of their own. The row that a genotype's first generation is drawn from, where its record does
+    not speak, is no row of later generations.
     """
     m = 1 if roots is None else roots.size
-    counts_first = roots is None or question.root_counts
+    counts_first = roots is None or record is not None or question.root_counts
     moves = question.steps - counts_first
     lineages = max(sizes) * int(np.clip(_WORTHWHILE // (m * question.steps * max(sizes)), 2, 40))
     at_once = max(1, _DESCENDANTS // (lineages * (moves + 1)))
@@ -128,6 +155,7 @@ def simulated_coverage(
         draw = asked[place]
         rng = keyed(question.seed, Purpose.WALKS, draw)
         urns = urns_of(posterior, keyed(question.seed, Purpose.POSTERIOR, draw))
+        own = None if record is None else record.draw(keyed(question.seed, Purpose.FIRST_GENERATION, draw))
         for start in range(0, m, at_once):
             block = slice(start, min(start + at_once, m))
             if roots is None:
@@ -135,7 +163,10 @@ def simulated_coverage(
                 first = rng.choice(offspring.size, (1, lineages), p=offspring / offspring.sum())
             else:
                 first = np.repeat(roots[block], lineages).reshape(-1, lineages)
-            states = urns.walks(first.astype(np.int64), moves, rng, roots=roots is not None)
+            if own is not None:
+                first = _first_generation(first, own[0][block], own[1][block], urns, rng)
+            begins = roots is not None and own is None
+            states = urns.walks(first.astype(np.int64), moves, rng, roots=begins)
             coverage[place, block], noise[place, block] = covered(
                 states[:, 0 if counts_first else lineages :], lineages, sizes, urns.niches
             )
@@ -143,6 +174,21 @@ def simulated_coverage(
 
     side_by_side(simulate, range(len(asked)), on_done)
     return Simulated(coverage, noise)
+
+
+def _first_generation(
+    roots: Ints, known: Floats, shares: sparse.csr_array, urns: Urns, rng: np.random.Generator
+) -> Ints:
+    """Children of roots (g, M): by what is known of each, in part, and else by the row of its niche."""
+    lineages = roots.shape[1]
+    first = urns.walks(roots, 1, rng, roots=True)[:, lineages:]
+    root, lineage = np.nonzero(rng.random(roots.shape) < known[:, None])
+    upto = np.concatenate([[0.0], np.cumsum(shares.data)])
+    begin, end = shares.indptr[root], shares.indptr[root + 1]
+    wanted = upto[begin] + rng.random(root.size) * (upto[end] - upto[begin])
+    place = np.searchsorted(upto, wanted, "right") - 1
+    first[root, lineage] = shares.indices[np.clip(place, begin, end - 1)]
+    return first
 
 
 def best_coverage(

@@ -8,13 +8,21 @@ import numpy as np
 import pytest
 from scipy.special import gammaln
 
+from nichechain.archive.building import build
 from nichechain.chain import TransitionCounts, estimate
-from nichechain.evolvability import l_evolvability, niche_evolvability
+from nichechain.evolvability import (
+    elite_evolvability,
+    genotype_evolvability,
+    l_evolvability,
+    niche_evolvability,
+)
 from nichechain.evolvability.coverage import rarefied_coverage
 from nichechain.evolvability.niches import answer_for_niches
 from nichechain.evolvability.question import MOST_EXACT, Question
 from nichechain.evolvability.urns import Simulated, best_coverage, simulated_coverage
+from nichechain.execution import Threads
 from nichechain.niches import GridNiches
+from nichechain.search.config import BuildConfig
 
 _BOUNDS = ((0.0, 1.0), (0.0, 1.0))
 
@@ -152,3 +160,26 @@ def test_a_copy_is_of_the_visit_that_its_number_says():
         for k in range(50):
             alike = np.flatnonzero(states[root, 7 : 50 + k] == states[root, 50 + k]) + 7
             assert origin[root, k] == alike[::-1][int(uniform[root, k] * alike.size)]
+
+
+@pytest.mark.parametrize("convention", ["definition", "procedure"])
+def test_genotypes_of_a_record_agree_with_the_closed_form(tmp_path, monkeypatch, convention):
+    config = BuildConfig("arm", (6, 6), ((-1, 1), (-1, 1)), evaluations=1500, scale=0.3)
+    with Threads(1) as threads:
+        archive = build(config, tmp_path / "a", threads)
+    chain = archive.chain()
+    asked = {"l": 3, "lineages": 12, "draws": 120, "convention": convention, "chain": chain}
+    exact = elite_evolvability(archive, **asked).set_index("niche")
+    elite = archive.elite(int(exact["recorded"].idxmax()))
+    of_one = genotype_evolvability(archive, elite, **asked)
+    share = genotype_evolvability(archive, elite, first_generation="empirical", **asked)
+    monkeypatch.setattr(Question, "by_urns", lambda *_: True)
+    simulated = elite_evolvability(archive, **asked).set_index("niche").loc[exact.index]
+    assert (exact["method"] == "exact").all()
+    assert (simulated["method"] == "urns").all()
+    error = np.hypot(exact["standard_error"], simulated["standard_error"])
+    assert (np.abs(simulated["value"] - exact["value"]) < 4.5 * error).all()
+    for first, known in (("posterior", of_one), ("empirical", share)):
+        found = genotype_evolvability(archive, elite, first_generation=first, **asked)
+        assert (found.method, found.recorded) == ("urns", known.recorded)
+        assert abs(found.value - known.value) < 4.5 * np.hypot(found.standard_error, known.standard_error)
