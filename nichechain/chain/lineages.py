@@ -119,13 +119,15 @@ class LineageLaw:
         return replace(transition, kept=drawn, shares=shares, spread=spread)
 
 
-def fitted_law(posterior: DirichletPosterior) -> LineageLaw | None:
+def fitted_law(posterior: DirichletPosterior, repeats: int = _REPEATS) -> LineageLaw | None:
     """The law that births of lineages make likely, or None where there are none.
 
     Parameters
     ----------
     posterior : DirichletPosterior
         Its counts have the lineages; rows of T are from births that are not of lineages.
+    repeats : int
+        Simulations of each brood, at least 2.
 
     Notes
     -----
@@ -143,7 +145,7 @@ def fitted_law(posterior: DirichletPosterior) -> LineageLaw | None:
     if not len(table):
         return None
     stay, error = _stay(posterior, table)
-    broods = _Broods(table, len(posterior.counts.niches))
+    broods = _Broods(table, len(posterior.counts.niches), repeats)
     rows = UrnRows.of(posterior)
     first = rows.scattered(posterior.elite_concentration)
     later = rows.with_stay(_base_stay(posterior), stay)
@@ -214,8 +216,8 @@ def _base_stay(posterior: DirichletPosterior) -> Floats:
 class _Broods:
     """Lineages by their elites: what they reached, and simulated ones of the same number and lengths."""
 
-    def __init__(self, table: Ints, niches: int) -> None:
-        self._niches = niches
+    def __init__(self, table: Ints, niches: int, repeats: int) -> None:
+        self._niches, self._repeats = niches, repeats
         brood, lineage, generation = table[:, 0], table[:, 1], table[:, 2]
         _, brood = np.unique(brood, return_inverse=True)
         # Lineages of a brood are numbered from 0.
@@ -237,11 +239,12 @@ class _Broods:
     ) -> Floats:
         """Niches that such broods reach when their later rows are each of some, (K, B, repeats)."""
         generations, states = self._present.shape[1], first.strength.size
-        found = np.zeros((len(later), self._size.size, _REPEATS))
+        found = np.zeros((len(later), self._size.size, self._repeats))
         for size in np.unique(self._size):
             these = np.flatnonzero(self._size == size)
-            roots = np.repeat(self._root[these], _REPEATS * size).reshape(-1, size)
-            kept = np.repeat(self._present[these][:, :, :size].reshape(these.size, -1), _REPEATS, axis=0)
+            roots = np.repeat(self._root[these], self._repeats * size).reshape(-1, size)
+            kept = self._present[these][:, :, :size].reshape(these.size, -1)
+            kept = np.repeat(kept, self._repeats, axis=0)
             small = states <= MOST_STATES and size * (generations + 1) <= MOST_VISITS
             # Urns of many states are gone through one by one, so that one kind is kept at a time.
             for some in [slice(0, len(later))] if small else [slice(k, k + 1) for k in range(len(later))]:
@@ -255,7 +258,7 @@ class _Broods:
                 visited = np.where(np.tile(kept, (len(kinds), 1)) & (visited < self._niches), visited, -1)
                 visited.sort(axis=1)
                 new = (visited[:, 1:] != visited[:, :-1]).sum(axis=1) + (visited[:, 0] >= 0)
-                found[some, these] = new.reshape(len(kinds), these.size, _REPEATS)
+                found[some, these] = new.reshape(len(kinds), these.size, self._repeats)
         return found
 
 

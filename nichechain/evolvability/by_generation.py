@@ -73,8 +73,11 @@ def evolvability_table(
     question = Question(longest, max(sizes), draws=draws, seed=seed)
     if chain.posterior is not None and chain.states > MOST_EXACT:
         return _simulated(chain, longest, sizes, question, on_done)
-    samples = question.samples(chain, on_done=on_done)
-    drawn = [_exact(some, longest, sizes, chain.n_niches) for some in samples]
+
+    def reached(draw: int) -> Floats:
+        return _exact(question.sample(chain, draw), longest, sizes, chain.n_niches)
+
+    drawn = side_by_side(reached, range(question.number_of_samples(chain)), on_done)
     mean = np.mean(drawn, axis=0)
     return np.stack([mean, *widened(mean, *drawn_interval(drawn), spread_of(chain), chain.n_niches)])
 

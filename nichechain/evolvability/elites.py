@@ -20,6 +20,7 @@ from nichechain.evolvability.niches import URNS, figures_of
 from nichechain.evolvability.question import DRAWS, Convention, Question, dense
 from nichechain.evolvability.record import own_strength, recorded_children
 from nichechain.evolvability.urns import Record, simulated_coverage
+from nichechain.execution.side_by_side import side_by_side
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -133,18 +134,21 @@ def _in_closed_form(
     on_done: Callable[[int], None] | None,
 ) -> tuple[tuple[Floats, Floats, Floats, Floats], bool]:
     """Mean, error and bounds of genotypes in these niches, (K,) each, and whether most are saturated."""
-    n, means, saturated = chain.n_niches, [], False
-    for number, drawn in enumerate(question.samples(chain, redraw=True, on_done=on_done)):
+    sizes, n = [question.lineages, ENDLESS], chain.n_niches
+
+    def covered(number: int) -> Floats:
+        drawn = question.sample(chain, number)
         known, shares = record.draw(keyed(question.seed, Purpose.FIRST_GENERATION, number))
         first: LinearOperator = _FirstRows(shares, 1.0 - known, drawn.rows, niches)
         if drawn.concentration is not None:
             first = shares.toarray() + (1.0 - known)[:, None] * dense(drawn.children(niches))
-        covered = expected_coverage(
-            drawn.onward, first, question.steps, [question.lineages, ENDLESS], counted=n
-        )
-        saturated |= bool(np.median(covered[:, 0] / np.maximum(covered[:, 1], 1e-300)) > SATURATED)
-        means.append(covered[:, 0])
-    return summary(np.array(means), np.zeros((len(means), niches.size)), spread_of(chain), n), saturated
+        return expected_coverage(drawn.onward, first, question.steps, sizes, counted=n)
+
+    numbers = range(question.number_of_samples(chain, redraw=True))
+    found = np.array(side_by_side(covered, numbers, on_done))
+    share = found[..., 0] / np.maximum(found[..., 1], 1e-300)
+    saturated = bool((np.median(share, axis=1) > SATURATED).any())
+    return summary(found[..., 0], np.zeros(found.shape[:2]), spread_of(chain), n), saturated
 
 
 @dataclass(frozen=True)

@@ -38,6 +38,8 @@ _COLUMNS = ("run", "parent_uid", "parent_niche", "child_niche")
 _LEVEL = 0.9
 # Draws of T for the values themselves, which cost nothing beside the resamples.
 _VALUE_DRAWS = 50
+# Simulations of each brood of a resample: a tenth of the variance that real broods have.
+_REPEATS = 10
 
 
 @dataclass(frozen=True)
@@ -207,7 +209,7 @@ def contrast(
         def figures(counts: TransitionCounts, draws: int, rng: np.random.Generator) -> Floats:
             posterior = refitted(fitted, counts)  # noqa: B023  # called in this round only
             if counts is not whole[number]:  # noqa: B023
-                posterior = replace(posterior, law=fitted_law(posterior))
+                posterior = replace(posterior, law=fitted_law(posterior, _REPEATS))
             found = np.zeros(2)
             for _ in range(draws):
                 one = replace(question, seed=int(rng.integers(2**31)))
