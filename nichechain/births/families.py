@@ -23,11 +23,11 @@ def tabulated(state: Ints, elite: Ints, child: Ints, children: Ints | None = Non
         How many births each entry stands for; by default one.
     """
     order = np.lexsort((child, elite, state))
-    rows = np.stack([state[order], elite[order], child[order]], axis=1)
-    which = np.cumsum(_differs(rows)) - 1
-    first = np.flatnonzero(np.diff(which, prepend=-1))
-    number = np.bincount(which, None if children is None else children[order], first.size)
-    return np.column_stack([rows[first], number]).astype(np.int64)
+    columns = [axis[order] for axis in (state, elite, child)]
+    first = np.flatnonzero(_differs(*columns))
+    births = np.ones(order.size, np.int64) if children is None else children[order]
+    number = np.add.reduceat(births, first) if first.size else first
+    return np.stack([*(axis[first] for axis in columns), number], axis=1).astype(np.int64, copy=False)
 
 
 def elites_of(families: Ints) -> Ints:
@@ -38,15 +38,17 @@ def elites_of(families: Ints) -> Ints:
     step = np.diff(owners, axis=0)
     if ((step[:, 0] > 0) | ((step[:, 0] == 0) & (step[:, 1] >= 0))).all():
         # As tables of families are.
-        return np.cumsum(_differs(owners)).astype(np.int64) - 1
+        return np.cumsum(_differs(*owners.T)).astype(np.int64) - 1
     _, number = np.unique(owners, axis=0, return_inverse=True)
     return number.ravel().astype(np.int64)
 
 
-def _differs(rows: Ints) -> NDArray[np.bool_]:
-    """Whether each row is not the one before, (N,)."""
-    new: NDArray[np.bool_] = np.concatenate([[True], (np.diff(rows, axis=0) != 0).any(axis=1)])
-    return new[: len(rows)]
+def _differs(*columns: Ints) -> NDArray[np.bool_]:
+    """Whether each row of some columns is not the one before, (N,)."""
+    new: NDArray[np.bool_] = np.arange(columns[0].size) == 0
+    for column in columns:
+        new[1:] |= column[1:] != column[:-1]
+    return new
 
 
 def folds_of(elite: Ints, folds: int, rng: np.random.Generator) -> Ints:
