@@ -6,7 +6,7 @@ import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 import tyro
 
@@ -47,6 +47,15 @@ try:
 class _Walks(WalkSettings):
     """What the studies share."""
 
+    GROUPS: ClassVar[Mapping[str, tuple[str, ...]]] = {
+        "mutation": ("mutation", "scale", "step_bound", "initialisation"),
+        "metric": ("k", "bandwidth", "mode", "decay", "archive_limit", "archive_scope", "litter"),
+        "walk": ("offspring", "states", "other_niche"),
+        "coverage": ("grid", "bounds"),
+        "domain": ("domain_seed", "options"),
+        "running": ("workers", "cache_memory"),
+    }
+
     domain: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="DOMAIN")]
     """What to walk on: fetch (Fetch Pick and Place), arm (a planar arm, in seconds), ..."""
     out: Annotated[Path, tyro.conf.arg(metavar="DIR")]
@@ -84,6 +93,8 @@ class _Walks(WalkSettings):
 class PressureCommand(_Walks):
     """Walks under rising evolutionary pressure, from random to highly selective."""
 
+    EXAMPLES: ClassVar[tuple[str, ...]] = ("nichechain walks pressure arm --runs 20 --out pressure",)
+
     levels: str = "selective,0.1,0.25,0.5,0.75,random"
     """Levels of pressure: selective, random, and the best share of the offspring that may follow."""
     steps: int = 50
@@ -102,6 +113,10 @@ class PressureCommand(_Walks):
 class MetricsCommand(_Walks):
     """Highly selective walks, each kind selecting for another diversity metric."""
 
+    EXAMPLES: ClassVar[tuple[str, ...]] = (
+        "nichechain walks metrics arm --runs 20 --metrics kde,knn --out metrics",
+    )
+
     metrics: str = "kde,knn,knn-no-archive,ancestors,parent"
     """Diversity metrics."""
     steps: int = 100
@@ -119,6 +134,10 @@ class MetricsCommand(_Walks):
 @dataclass(frozen=True)
 class SensitivityCommand(_Walks):
     """Highly selective walks, each kind with another value of one parameter."""
+
+    EXAMPLES: ClassVar[tuple[str, ...]] = (
+        "nichechain walks sensitivity arm --vary k --runs 10 --out sensitivity",
+    )
 
     vary: Literal["scale", "bandwidth-mode", "decay", "k", "offspring", "initialisation"] = "scale"
     """The parameter that is varied."""
@@ -139,6 +158,10 @@ class SensitivityCommand(_Walks):
 @dataclass(frozen=True)
 class PopulationCommand(_Walks):
     """Multi-state walks, each kind selecting its population for another diversity metric."""
+
+    EXAMPLES: ClassVar[tuple[str, ...]] = (
+        "nichechain walks population arm --runs 20 --scale 0.1 --out population",
+    )
 
     metrics: str = "kde,knn"
     """Diversity metrics."""
