@@ -7,11 +7,12 @@ from __future__ import annotations
 
 from typing import Any
 
-import numba
 import numpy as np
 
+from nichechain.core.compiled import compiled
 
-@numba.njit(nogil=True, cache=True)
+
+@compiled
 def landed(parent: Any, move: Any, shape: Any) -> Any:
     """Niche that each parent's child lands in by a number of the kernel, or -1 off the grid."""
     child = np.empty(parent.size, np.int64)

@@ -10,6 +10,8 @@ from typing import Any
 import numba
 import numpy as np
 
+from nichechain.core.compiled import compiled
+
 
 @numba.njit(nogil=True, inline="always")
 def _below(upto: Any, wanted: Any) -> Any:
@@ -18,7 +20,7 @@ def _below(upto: Any, wanted: Any) -> Any:
     return place if place < upto.size else np.searchsorted(upto, upto[-1], "left")
 
 
-@numba.njit(nogil=True, cache=True)
+@compiled
 def draw(voices: Any, shift: Any, moves: Any, pairs: Any, niches: Any, asked: Any, drawn: Any) -> None:
     """Write a column for each row that is asked for: whose words are taken, then which birth's."""
     start, child, upto = pairs

@@ -7,11 +7,12 @@ from __future__ import annotations
 
 from typing import Any
 
-import numba
 import numpy as np
 
+from nichechain.core.compiled import compiled
 
-@numba.njit(nogil=True, cache=True)
+
+@compiled
 def choose(
     start: Any,
     column: Any,
@@ -68,7 +69,7 @@ def choose(
             times[state] = 0
 
 
-@numba.njit(nogil=True, cache=True)
+@compiled
 def resolve(origin: Any, fresh: Any, states: Any, done: Any) -> None:
     """The children: that of visit v is in place v + M, M after its parent."""
     g, lineages = origin.shape

@@ -7,11 +7,12 @@ from __future__ import annotations
 
 from typing import Any
 
-import numba
 import numpy as np
 
+from nichechain.core.compiled import compiled
 
-@numba.njit(nogil=True, cache=True)
+
+@compiled
 def tables(start: Any, column: Any, weight: Any) -> Any:
     """For each cell the share that is its own entry's, and whose the rest is."""
     keep = np.ones(column.size)
@@ -46,7 +47,7 @@ def tables(start: Any, column: Any, weight: Any) -> Any:
     return keep, other
 
 
-@numba.njit(nogil=True, cache=True)
+@compiled
 def draw(start: Any, column: Any, keep: Any, other: Any, rows: Any, uniform: Any, drawn: Any) -> None:
     """Write one column for each of some rows."""
     for k in range(rows.size):

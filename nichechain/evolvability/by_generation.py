@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse, stats
@@ -16,6 +15,7 @@ from scipy import sparse, stats
 from nichechain.chain.lineages import urns_of
 from nichechain.chain.model import NicheChain
 from nichechain.core.checks import check_at_least
+from nichechain.core.compiled import compiled
 from nichechain.core.intervals import drawn_interval
 from nichechain.core.randomness import Purpose, keyed
 from nichechain.evolvability.averaging import spread_of, widened
@@ -132,7 +132,7 @@ def _products(exponents: list[int]) -> tuple[Ints, Ints]:
     return np.array(factors, np.int64).reshape(-1, 2), np.array([known[size] for size in exponents])
 
 
-@numba.njit(nogil=True, cache=True)
+@compiled
 def _add_reached(hit: Any, factors: Any, powers: Any, found: Any) -> None:
     """Add 1 - (1 - h)^U of the targets (m, c) to the niches reached, (k, m)."""
     roots, targets = hit.shape
@@ -200,7 +200,7 @@ def _by_spread(drawn: Floats, noise: Floats) -> Floats:
     return np.stack([mean, np.maximum(mean - half, 0.0), np.minimum(mean + half, drawn.shape[-1])])
 
 
-@numba.njit(nogil=True, cache=True)
+@compiled
 def _count(states: Any, lineages: Any, niches: Any, longest: Any, whole: Any, part: Any) -> Any:
     """Niches visited within 1 to ``longest`` generations, and their variance by halves: (g, k, longest)."""
     g, sizes, half = states.shape[0], whole.shape[0], lineages // 2

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
+
+from nichechain.core.compiled import compiled
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -66,7 +67,7 @@ def _arrays(matrix: sparse.csr_array) -> tuple[Ints, Ints, Floats]:
     return matrix.indptr.astype(np.int64), matrix.indices.astype(np.int64), matrix.data
 
 
-@numba.njit(nogil=True, cache=True)
+@compiled
 def _fill(out_rows: Any, back_rows: Any, states: Any, longest: Any, returns: Any) -> None:
     """Write the probabilities of :func:`return_probabilities`, state by state."""
     size = out_rows[0].size - 1
@@ -102,7 +103,7 @@ def _fill(out_rows: Any, back_rows: Any, states: Any, longest: Any, returns: Any
         back[back_at[:backs]] = 0.0
 
 
-@numba.njit(nogil=True, cache=True)
+@compiled
 def _advance(rows: Any, here: Any, here_at: Any, count: Any, there: Any, there_at: Any) -> Any:
     """Move all probability from ``here`` one step on, to ``there``, and leave ``here`` zero."""
     pointer, column, probability = rows
@@ -123,7 +124,7 @@ def _advance(rows: Any, here: Any, here_at: Any, count: Any, there: Any, there_a
     return landed
 
 
-@numba.njit(nogil=True, cache=True)
+@compiled
 def _meet_next(rows: Any, here: Any, here_at: Any, count: Any, other: Any) -> Any:
     """Probability that one step on from ``here`` meets ``other``."""
     pointer, column, probability = rows

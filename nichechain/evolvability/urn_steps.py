@@ -7,11 +7,12 @@ from __future__ import annotations
 
 from typing import Any
 
-import numba
 import numpy as np
 
+from nichechain.core.compiled import compiled
 
-@numba.njit(nogil=True, cache=True)
+
+@compiled
 def count(states: Any, lineages: Any, half: Any, niches: Any, whole: Any, early: Any, late: Any) -> Any:
     """Niches visited by some of all, of the first half and of the second half of lineages, (g, k) each."""
     g, visits = states.shape

@@ -19,12 +19,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 from scipy.linalg import solve_triangular
 
+from nichechain.core.compiled import compiled
 from nichechain.core.errors import NichechainError
 
 Floats = NDArray[np.float64]
@@ -178,7 +178,7 @@ def _of_largest(visits: Floats) -> Floats:
     return shares
 
 
-@numba.njit(nogil=True, cache=True)
+@compiled
 def _eliminate_block(onward: Any, out: Any, beyond: Any, start: Any, end: Any, closed: Any) -> Any:
     """Eliminate states of a block from its own rows and columns; whether all of them are ever left.
 
@@ -217,7 +217,7 @@ def _eliminate_block(onward: Any, out: Any, beyond: Any, start: Any, end: Any, c
     return True
 
 
-@numba.njit(nogil=True, cache=True)
+@compiled
 def _visits(factors: Any) -> Any:
     """Visits to each state relative to the last one, from the factors' lower part, scaled."""
     size = factors.shape[0]
@@ -231,7 +231,7 @@ def _visits(factors: Any) -> Any:
     return visits
 
 
-@numba.njit(nogil=True, cache=True)
+@compiled
 def _eliminate_band(band: Any, leaving: Any, closed: Any) -> Any:
     """Factorise a band in place; whether all states are ever left."""
     size, width = band.shape[0], band.shape[1] // 2
@@ -257,7 +257,7 @@ def _eliminate_band(band: Any, leaving: Any, closed: Any) -> Any:
     return True
 
 
-@numba.njit(nogil=True, cache=True)
+@compiled
 def _solve_band(band: Any, right: Any) -> Any:
     size, width = band.shape[0], band.shape[1] // 2
     found = right.copy()
@@ -271,7 +271,7 @@ def _solve_band(band: Any, right: Any) -> Any:
     return found
 
 
-@numba.njit(nogil=True, cache=True)
+@compiled
 def _solve_band_transposed(band: Any, right: Any) -> Any:
     size, width = band.shape[0], band.shape[1] // 2
     found = right.copy()
@@ -285,7 +285,7 @@ def _solve_band_transposed(band: Any, right: Any) -> Any:
     return found
 
 
-@numba.njit(nogil=True, cache=True)
+@compiled
 def _visits_of_band(band: Any) -> Any:
     """Visits to each state relative to the last one, scaled."""
     size, width = band.shape[0], band.shape[1] // 2

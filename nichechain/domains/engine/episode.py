@@ -11,9 +11,9 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import numba
 import numpy as np
 
+from nichechain.core.compiled import compiled
 from nichechain.domains.engine._call import call
 from nichechain.domains.engine.motions import code_of
 from nichechain.domains.engine.policy import forward
@@ -27,7 +27,7 @@ POSE = 7
 _GIMBAL = np.finfo(np.float64).eps * 4.0
 
 
-@numba.njit(nogil=True, cache=True)
+@compiled
 def _arctan2(c: Any, y: Any, x: Any, work: Any) -> Any:
     """``np.arctan2(y, x)`` by NumPy's own loop; ``work`` is int64 memory of at least 8 words."""
     values = work[8:11].view(np.float64)
@@ -41,7 +41,7 @@ def _arctan2(c: Any, y: Any, x: Any, work: Any) -> Any:
     return values[2]
 
 
-@numba.njit(nogil=True, cache=True)
+@compiled
 def _matvec(c: Any, matrix: Any, vector: Any, out: Any, work: Any) -> None:
     """``out[:] = matrix @ vector`` by NumPy's own loop, called as ``ndarray @ ndarray`` calls it."""
     rows, columns = matrix.shape
@@ -60,7 +60,7 @@ def _matvec(c: Any, matrix: Any, vector: Any, out: Any, work: Any) -> None:
     call(c[_MATMUL], (base, base + 24, base + 56, c[_MATMUL_DATA]))
 
 
-@numba.njit(nogil=True, cache=True)
+@compiled
 def _euler(c: Any, m: Any, out: Any, work: Any) -> None:
     """``rotations.mat2euler`` of gymnasium-robotics for one matrix, flat in C order."""
     cy = math.sqrt(m[8] * m[8] + m[5] * m[5])
@@ -74,7 +74,7 @@ def _euler(c: Any, m: Any, out: Any, work: Any) -> None:
         out[0] = 0.0
 
 
-@numba.njit(nogil=True, cache=True)
+@compiled
 def _observe(
     c: Any, model: Any, data: Any, state: Any, ids: Any, dt: Any, jac: Any, work: Any, out: Any
 ) -> None:
@@ -113,7 +113,7 @@ def _observe(
     out[23], out[24] = qvel[right] * dt, qvel[left] * dt
 
 
-@numba.njit(nogil=True, cache=True)
+@compiled
 def _clip(value: Any) -> Any:
     """``np.clip`` to [-1, 1], as the environment's step does with an action; NaN stays."""
     if value > np.float32(1.0):
@@ -123,7 +123,7 @@ def _clip(value: Any) -> Any:
     return value
 
 
-@numba.njit(nogil=True, cache=True)
+@compiled
 def _act(state: Any, action: Any, actuator_qpos: Any, ids: Any, blocked: Any) -> None:
     """``_set_action``: a displacement of the mocap body, and targets for the fingers."""
     qpos, _, ctrl, mocap_pos, mocap_quat, xpos, xquat, _, _ = state
@@ -139,7 +139,7 @@ def _act(state: Any, action: Any, actuator_qpos: Any, ids: Any, blocked: Any) ->
         ctrl[i] = grip if actuator_qpos[i] < 0 else qpos[actuator_qpos[i]] + grip
 
 
-@numba.njit(nogil=True, cache=True)
+@compiled
 def _restore(c: Any, model: Any, data: Any, state: Any, ids: Any, parts: Any, snapshot: Any) -> None:
     """What the next action and the steps after it read, as it was when the snapshot was taken."""
     xpos, xquat = state[5][ids[6]], state[6][ids[6]]
@@ -148,7 +148,7 @@ def _restore(c: Any, model: Any, data: Any, state: Any, ids: Any, parts: Any, sn
     xpos[:], xquat[:] = pose[:3], pose[3:]
 
 
-@numba.njit(nogil=True, cache=True)
+@compiled
 def _snapshot(c: Any, model: Any, data: Any, state: Any, ids: Any, parts: Any, out: Any) -> None:
     """The reverse of :func:`_restore`."""
     call(c[_GET_STATE], (model, data, out.ctypes.data, parts))
@@ -156,7 +156,7 @@ def _snapshot(c: Any, model: Any, data: Any, state: Any, ids: Any, parts: Any, o
     pose[:3], pose[3:] = state[5][ids[6]], state[6][ids[6]]
 
 
-@numba.njit(nogil=True, cache=True)
+@compiled
 def run(
     c: Any,
     model: Any,

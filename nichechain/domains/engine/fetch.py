@@ -293,7 +293,8 @@ class NativeFetch:
 
 def _is_compiled(episode: ModuleType) -> bool:
     """Whether numba has kept machine code of the episode that is newer than its source."""
-    kept = Path(episode.run.stats.cache_path).glob("episode.run-*.nbi")
+    folder = episode.run.stats.cache_path
+    kept = [] if folder is None else Path(folder).glob("episode.run-*.nbi")
     source = Path(str(episode.__file__)).stat().st_mtime
     return any(index.stat().st_mtime >= source for index in kept)
 

@@ -21,11 +21,11 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-import numba
 import numpy as np
 from numba import carray  # type: ignore[attr-defined]
 from numpy.typing import NDArray
 
+from nichechain.core.compiled import compiled
 from nichechain.domains.engine._memory import floats_at, load, store
 from nichechain.domains.engine.policy import forward
 
@@ -39,7 +39,7 @@ _SLAB_ROWS = 4096
 _MOST = 2**40
 
 
-@numba.njit(nogil=True, cache=True)
+@compiled
 def code_of(action: Any, blocked: Any) -> Any:
     """A number for a clipped action whose components are all -1, 0 or 1; -1 for any other.
 
@@ -65,12 +65,12 @@ def code_of(action: Any, blocked: Any) -> Any:
     return code
 
 
-@numba.njit(nogil=True, cache=True)
+@compiled
 def _address(slabs: Any, rows: Any, width: Any, node: Any) -> Any:
     return slabs[node // rows] + (node % rows) * width * _WORD
 
 
-@numba.njit(nogil=True, cache=True)
+@compiled
 def _child(slabs: Any, rows: Any, width: Any, node: Any, code: Any) -> Any:
     """The node that an action leads to; -1 if nobody has been there."""
     child = load(_address(slabs, rows, width, node) + _CHILD * _WORD)
@@ -82,7 +82,7 @@ def _child(slabs: Any, rows: Any, width: Any, node: Any, code: Any) -> Any:
     return np.int64(-1)
 
 
-@numba.njit(nogil=True, cache=True)
+@compiled
 def walk(
     slabs: Any,
     rows: Any,
@@ -138,7 +138,7 @@ def walk(
         t += 1
 
 
-@numba.njit(nogil=True, cache=True)
+@compiled
 def _write(
     slabs: Any, rows: Any, width: Any, node: Any, parent: Any, code: Any, now: Any, seen: Any, state: Any
 ) -> None:
@@ -157,7 +157,7 @@ def _write(
         store(link, node)
 
 
-@numba.njit(nogil=True, cache=True)
+@compiled
 def _insert(
     slabs: Any,
     rows: Any,
@@ -189,7 +189,7 @@ def _insert(
     return used
 
 
-@numba.njit(nogil=True, cache=True)
+@compiled
 def _stamps(slabs: Any, rows: Any, width: Any, used: Any) -> Any:
     """When each node was last used."""
     stamps = np.empty(used, np.int64)
@@ -198,7 +198,7 @@ def _stamps(slabs: Any, rows: Any, width: Any, used: Any) -> Any:
     return stamps
 
 
-@numba.njit(nogil=True, cache=True)
+@compiled
 def _compact(slabs: Any, rows: Any, width: Any, places: Any, capacity: Any, newest_lost: Any) -> Any:
     """Drop nodes last used at ``newest_lost`` or before, and what would not fit; how many are left.
 

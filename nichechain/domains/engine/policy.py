@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import numba
 import numpy as np
 
+from nichechain.core.compiled import compiled
 from nichechain.domains.policies.controllers import (
     EXP_TERMS,
     INVERSE_LN2,
@@ -20,7 +20,7 @@ from nichechain.domains.policies.controllers import (
 )
 
 
-@numba.njit(nogil=True, cache=True)
+@compiled
 def _tanh(value: Any) -> Any:
     """One value of :func:`nichechain.domains.policies.controllers.tanh`, operation by operation."""
     size = abs(np.float64(value))
@@ -36,7 +36,7 @@ def _tanh(value: Any) -> Any:
     return np.float32(math.copysign(1.0 - 2.0 / (power + 1.0), value))
 
 
-@numba.njit(nogil=True, cache=True)
+@compiled
 def forward(
     parameters: Any, sizes: Any, activations: Any, hidden: Any, observation: Any, action: Any
 ) -> None:
