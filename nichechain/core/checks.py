@@ -96,6 +96,30 @@ def check_at_least(least: int, **values: object) -> None:
             raise NichechainError(f"{name} is {value}, but must {allowed}")
 
 
+def check_lineages(offspring: int, **values: object) -> None:
+    """Refuse more lineages than there are offspring to begin them.
+
+    Parameters
+    ----------
+    offspring : int
+        How many there are of a genotype.
+    **values
+        Numbers of lineages by the names that the caller knows them by. None stands for a default, and passes.
+
+    Raises
+    ------
+    NichechainError
+        If a value is no whole number, below 1, or above the number of offspring.
+    """
+    for name, value in values.items():
+        if value is not None:
+            check_at_least(1, **{name: value})
+            if value > offspring:  # type: ignore[operator]
+                raise NichechainError(
+                    f"{name} is {value}, but must be at most {offspring}: each begins with a child of its own"
+                )
+
+
 def check_positive(**values: object) -> None:
     """Refuse what is no finite number above 0.
 

@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nichechain.births.table import NONE, niches_of
-from nichechain.core.checks import check_at_least, check_seed
-from nichechain.core.errors import NichechainError
+from nichechain.core.checks import check_at_least, check_lineages, check_seed
 from nichechain.core.intervals import mean_interval
 from nichechain.core.randomness import Purpose
 from nichechain.core.rarefaction import niches_among
@@ -107,12 +106,7 @@ def meta_evolvability(
     check_at_least(1, offspring=offspring)
     check_seed(seed)
     most = min(offspring, children)
-    if lineages is not None:
-        check_at_least(1, lineages=lineages)
-        if lineages > most:
-            raise NichechainError(
-                f"lineages is {lineages}, but must be at most {most}: no genotype has more offspring here"
-            )
+    check_lineages(most, lineages=lineages)
     size = most if lineages is None else lineages
     mutate = archive.mutate
 

@@ -15,6 +15,7 @@ from nichechain.core.checks import (
     as_shape,
     check_at_least,
     check_choice,
+    check_lineages,
     check_numbers,
     check_positive,
     plain_options,
@@ -263,11 +264,7 @@ class BuildConfig(SearchConfig):
     def _check_objective(self) -> None:
         check_choice("objective", self.objective, get_args(ObjectiveName))
         check_at_least(1, offspring=self.offspring, objective_l=self.objective_l)
-        if self.objective_lineages is not None and not 1 <= self.objective_lineages <= self.offspring:
-            raise NichechainError(
-                f"objective_lineages is {self.objective_lineages}, but must be from 1 to offspring, "
-                f"{self.offspring}: each lineage begins with a child of its own"
-            )
+        check_lineages(self.offspring, objective_lineages=self.objective_lineages)
         if self.objective != "domain" and self.replacement != "objective":
             raise NichechainError(
                 f"objective is {self.objective!r}, so replacement must be 'objective', but replacement is "

@@ -24,27 +24,12 @@ from nichechain.execution import Threads
 from nichechain.search import elites, map_elites
 from nichechain.search.config import BuildConfig
 
+from ..arms import RoughArm
+
 CONFIG = BuildConfig(
     "arm", (9, 7), ((-0.7, 1.0), (-0.9, 0.8)), evaluations=3000, initial=100, batch=64, scale=0.3, seed=5
 )
 SHORT = replace(CONFIG, evaluations=333, initial=50, batch=32)
-
-
-class RoughArm(PlanarArm):
-    """An arm that breaks now and then, handed out in small chunks."""
-
-    chunk = 5
-
-    def evaluate(self, genotypes: ArrayLike) -> Evaluation:
-        angles = np.asarray(genotypes)
-        plain = super().evaluate(angles)
-        broken = angles[:, 0] > 0.8
-        return Evaluation(
-            np.where(broken[:, None], np.nan, plain.behavior),
-            np.where(broken, np.nan, plain.objective),
-            broken,
-            tuple("the first joint broke" if bad else "" for bad in broken),
-        )
 
 
 def content(folder: Path) -> dict[str, bytes]:

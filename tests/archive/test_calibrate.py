@@ -11,16 +11,17 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 import nichechain as nc
 from nichechain.archive.merge import merge
 from nichechain.core.errors import ArchiveError, NichechainError
-from nichechain.domains import Evaluation, PlanarArm
+from nichechain.domains import Evaluation
 from nichechain.domains.base import Domain
 from nichechain.execution import Threads
 from nichechain.verification import verify
 
+from ..arms import RoughArm
 from .folder.samples import content, edited, written
 
 # The last step is cut, so children are pending that will never be born.
@@ -122,17 +123,6 @@ def test_few_births_are_whole_lineages(rollouts: int, pristine: Path, tmp_path: 
     new = nc.load(calibrated(pristine, tmp_path / "archive", rollouts)).births()[450:]
     assert len(new) == rollouts
     assert new["lineage"].sum() == rollouts - -(-rollouts // 6)
-
-
-class RoughArm(PlanarArm):
-    """An arm that breaks now and then."""
-
-    def evaluate(self, genotypes: ArrayLike) -> Evaluation:
-        plain = super().evaluate(genotypes)
-        broken = np.asarray(genotypes)[:, 0] > 0.8
-        behavior = np.where(broken[:, None], np.nan, plain.behavior)
-        reasons = tuple("the first joint broke" if bad else "" for bad in broken)
-        return Evaluation(behavior, np.where(broken, np.nan, plain.objective), broken, reasons)
 
 
 class Stopping:

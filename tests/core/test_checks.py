@@ -7,6 +7,7 @@ import pytest
 from nichechain.core.checks import (
     check_at_least,
     check_choice,
+    check_lineages,
     check_numbers,
     check_positive,
     check_share,
@@ -23,6 +24,12 @@ from nichechain.core.errors import NichechainError
         (lambda: check_at_least(2, folds=5, resamples=1), "resamples is 1, but must be at least 2"),
         (lambda: check_at_least(0, seed=-1), "seed is -1, but must not be negative"),
         (lambda: check_at_least(1, draws=2.0), "draws is 2.0, but must be a whole number"),
+        (lambda: check_lineages(5, lineages=0), "lineages is 0, but must be at least 1"),
+        (lambda: check_lineages(5, lineages=2.0), "lineages is 2.0, but must be a whole number"),
+        (
+            lambda: check_lineages(5, lineages=6),
+            "lineages is 6, but must be at most 5: each begins with a child of its own",
+        ),
         (lambda: check_positive(scale=0), "scale is 0, but must be a positive number"),
         (lambda: check_positive(scale=math.inf), "scale is inf, but must be a positive number"),
         (lambda: check_positive(scale=math.nan), "scale is nan, but must be a positive number"),
@@ -44,6 +51,7 @@ def test_what_is_in_range_passes():
     check_at_least(1, draws=1, folds=np.int64(7))
     check_at_least(-1, place=-1)
     check_positive(scale=np.float32(0.5), size=3)
+    check_lineages(5, lineages=5, objective_lineages=None)
     check_share(share=1)
     check_choice("mode", "b", iter(("a", "b")))
 

@@ -9,13 +9,15 @@ import pytest
 
 from nichechain.core.rarefaction import distinct_among, mean_product
 
+from ..choices import mean_distinct
+
 
 @pytest.mark.parametrize("size", range(1, 8))
 def test_distinct_kinds_are_those_of_all_subsets(size):
     # Two of the sample are of no kind that counts.
     sample = [0, 0, 0, 1, 2, None, None]
-    every = [len(set(drawn) - {None}) for drawn in combinations(sample, size)]
-    np.testing.assert_allclose(distinct_among(np.array([3, 1, 1, 0]), 7, size), np.mean(every), rtol=1e-12)
+    expected = mean_distinct(sample, size, nowhere=[None])
+    np.testing.assert_allclose(distinct_among(np.array([3, 1, 1, 0]), 7, size), expected, rtol=1e-12)
 
 
 @pytest.mark.parametrize("size", range(6))

@@ -23,6 +23,8 @@ from nichechain.evolvability.coverage import (
     visit_probabilities,
 )
 
+from ..choices import mean_distinct
+
 
 @st.composite
 def chains(draw, largest=6):
@@ -253,22 +255,13 @@ def test_simulation_is_a_function_of_its_generator():
     assert not np.array_equal(runs[0], runs[2])
 
 
-def _rarefied_by_subsets(counts, size, counted):
-    """Mean number of niches over every subset of that many offspring."""
-    offspring = [niche for niche, count in enumerate(counts) for _ in range(count)]
-    sizes = [
-        len({niche for niche in subset if niche < counted})
-        for subset in itertools.combinations(offspring, size)
-    ]
-    return sum(sizes) / len(sizes)
-
-
 @given(st.lists(st.integers(0, 4), min_size=1, max_size=5).filter(lambda c: 1 <= sum(c) <= 10), st.data())
 @settings(deadline=None, max_examples=60)
 def test_rarefaction_is_the_mean_over_all_subsets(counts, data):
     size = data.draw(st.integers(1, sum(counts)))
     counted = data.draw(st.integers(1, len(counts)))
-    expected = _rarefied_by_subsets(counts, size, counted)
+    offspring = [niche for niche, count in enumerate(counts) for _ in range(count)]
+    expected = mean_distinct(offspring, size, nowhere=range(counted, len(counts)))
     assert rarefied_coverage(counts, size, counted=counted) == pytest.approx(expected, rel=1e-10, abs=1e-12)
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import combinations
 from types import SimpleNamespace
 
 import numpy as np
@@ -11,27 +10,15 @@ import pytest
 from nichechain import Threads, variation
 from nichechain.core.intervals import mean_interval
 from nichechain.core.randomness import Purpose, keyed
-from nichechain.domains import PlanarArm
-from nichechain.domains.base import Evaluation
 from nichechain.evolvability import meta_evolvability
 from nichechain.niches import GridNiches
 
+from ..arms import BrittleArm
+from ..choices import mean_distinct
+
 MUTATE = variation.gaussian(0.3)
 
-
-class BreakingArm(PlanarArm):
-    """An arm that breaks where its first joint is far from its rest."""
-
-    def evaluate(self, genotypes):
-        """Fail there."""
-        fine = super().evaluate(genotypes)
-        failed = np.abs(np.asarray(genotypes)[:, 0]) > 0.4
-        behavior = np.where(failed[:, None], np.nan, fine.behavior)
-        reasons = tuple("broken" if bad else "" for bad in failed)
-        return Evaluation(behavior, np.where(failed, np.nan, fine.objective), failed, reasons)
-
-
-DOMAIN = BreakingArm()
+DOMAIN = BrittleArm()
 NICHES = GridNiches((4, 4), ((-0.5, 1.0), (-1.0, 1.0)))
 ARCHIVE = SimpleNamespace(domain=DOMAIN, mutate=MUTATE, niches=NICHES)
 ELITE = SimpleNamespace(genotype=DOMAIN.sample(1, seed=3)[0] * 0.2)
@@ -46,8 +33,8 @@ def landed(genotypes):
 
 
 def rarefied(states, size):
-    """Mean over all choices of so many; None is nowhere, 16 is outside."""
-    return np.mean([len(set(some) - {None, 16}) for some in combinations(states, size)])
+    """None is nowhere, 16 is outside."""
+    return mean_distinct(states, size, nowhere=(None, 16))
 
 
 @pytest.mark.parametrize("lineages", [None, 2])

@@ -13,7 +13,7 @@ from nichechain.evolvability.reach import reach
 from nichechain.niches import CVTNiches, GridNiches
 from nichechain.plots.cells import borders, cells_along, fill, frame, hatch, voronoi_cells
 
-from ..niches.spaces import build, config  # noqa: TID252  # tests are no installed package
+from ..niches.spaces import build, config
 
 BOX = ((1.0, 1.5), (0.4, 1.1))
 

@@ -23,7 +23,7 @@ from nichechain.search.config import BuildConfig
 from nichechain.search.lineages import Calibration, Stretch
 from nichechain.verification import verify
 
-from .test_map_elites import RoughArm
+from ..arms import RoughArm
 
 # A step of 40 births has 12 of lineages on average: two or three generations of a brood.
 CONFIG = BuildConfig(

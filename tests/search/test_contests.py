@@ -126,7 +126,7 @@ def test_a_state_that_nobody_leaves_is_not_contested():
         ({"offspring": 0}, "offspring is 0, but must be at least 1"),
         ({"offspring": 2.5}, "offspring is 2.5, but must be a whole number"),
         ({"objective_l": 0}, "objective_l is 0, but must be at least 1"),
-        ({"objective_lineages": 3}, "objective_lineages is 3, but must be from 1 to offspring, 2"),
+        ({"objective_lineages": 3}, "objective_lineages is 3, but must be at most 2"),
         ({"replacement": "random"}, "so replacement must be 'objective', but replacement is 'random'"),
     ],
 )

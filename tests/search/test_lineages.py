@@ -18,7 +18,7 @@ from nichechain.execution import Threads
 from nichechain.search.config import BuildConfig
 from nichechain.search.lineages import Calibration, Stretch, UnderWay
 
-from .test_map_elites import RoughArm
+from ..arms import RoughArm
 
 CONFIG = BuildConfig(
     "arm",

@@ -19,6 +19,8 @@ from nichechain.search.selection import Told
 from nichechain.steering import make_contests
 from nichechain.steering.direct import OffspringCoverage, OffspringLineages
 
+from ..choices import mean_distinct
+
 CONFIG = BuildConfig(
     "cosinus",
     (20,),
@@ -47,8 +49,8 @@ def births() -> Told:
 def test_one_generation_is_the_mean_over_all_choices_of_children(lineages):
     # 6 is outside, and one child failed.
     children = np.array([2, 2, 6, -1, 4])
-    every = [len(set(some) - {6, -1}) for some in combinations(children.tolist(), lineages)]
-    assert OffspringCoverage(NICHES, lineages)(children) == pytest.approx(np.mean(every), abs=1e-9)
+    expected = mean_distinct(children, lineages, nowhere=(6, -1))
+    assert OffspringCoverage(NICHES, lineages)(children) == pytest.approx(expected, abs=1e-9)
 
 
 @pytest.mark.parametrize("lineages", [1, 3, 5])
@@ -87,8 +89,7 @@ def account(config: BuildConfig, rows: list[dict]) -> dict[int, int]:
     children: dict[int, list[int | None]] = {}
 
     def value(uid: int) -> float:
-        landed = children[uid]
-        return float(np.mean([len(set(some) - {None}) for some in combinations(landed, m)]))
+        return mean_distinct(children[uid], m, nowhere=[None])
 
     def settle() -> None:
         for niche, uid in list(contest.items()):

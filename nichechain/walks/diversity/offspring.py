@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from nichechain.core.checks import check_at_least
+from nichechain.core.checks import check_at_least, check_lineages
 from nichechain.core.errors import NichechainError
 from nichechain.core.rarefaction import niches_among
 from nichechain.walks.diversity.metrics import Surroundings
@@ -47,12 +47,7 @@ class OffspringNiches:
 
     def __post_init__(self) -> None:
         check_at_least(1, offspring=self.offspring)
-        if self.lineages is not None:
-            check_at_least(1, lineages=self.lineages)
-            if self.lineages > self.offspring:
-                raise NichechainError(
-                    f"lineages is {self.lineages}, but must be at most offspring, {self.offspring}"
-                )
+        check_lineages(self.offspring, lineages=self.lineages)
 
     @property
     def remembers(self) -> bool:

@@ -2,35 +2,21 @@
 
 from __future__ import annotations
 
-from itertools import combinations
-
 import numpy as np
 import pytest
 
 from nichechain import NichechainError, variation
 from nichechain.births.table import NONE
 from nichechain.core.randomness import Purpose, keyed
-from nichechain.domains import PlanarArm
-from nichechain.domains.base import Evaluation
 from nichechain.execution import Threads
 from nichechain.niches import GridNiches
 from nichechain.walks import BetterThanParent, Selective, TopFraction, WalkConfig, Walks, run_seed, walk
 from nichechain.walks.diversity import OffspringNiches, Surroundings
 
+from ...arms import BrittleArm
+from ...choices import mean_distinct
 
-class BreakingArm(PlanarArm):
-    """An arm that breaks where its first joint is far from its rest."""
-
-    def evaluate(self, genotypes):
-        """Fail there."""
-        fine = super().evaluate(genotypes)
-        failed = np.abs(np.asarray(genotypes)[:, 0]) > 0.5
-        behavior = np.where(failed[:, None], np.nan, fine.behavior)
-        reasons = tuple("broken" if bad else "" for bad in failed)
-        return Evaluation(behavior, np.where(failed, np.nan, fine.objective), failed, reasons)
-
-
-ARM = BreakingArm()
+ARM = BrittleArm()
 MUTATE = variation.gaussian(0.2)
 NICHES = GridNiches((6, 6), ARM.bounds)
 
@@ -52,7 +38,7 @@ def test_a_score_is_the_mean_over_all_choices_of_offspring():
         nothing, nothing, np.zeros((1, 0), int), nothing[None], np.ones(2), litters=litters, niches=8
     )
     score = OffspringNiches(5, 3)(query, np.zeros(3, int), np.arange(3), around)
-    expected = np.mean([len(set(some) - {8, NONE}) for some in combinations(litters[0, 0].tolist(), 3)])
+    expected = mean_distinct(litters[0, 0], 3, nowhere=(8, NONE))
     np.testing.assert_allclose(score, [[expected, 1.0, np.nan]])
 
 
@@ -135,7 +121,7 @@ def test_a_state_is_scored_as_its_children_are():
     ("call", "message"),
     [
         (lambda: OffspringNiches(0), "offspring is 0, but must be at least 1"),
-        (lambda: OffspringNiches(5, 6), "lineages is 6, but must be at most offspring, 5"),
+        (lambda: OffspringNiches(5, 6), "lineages is 6, but must be at most 5"),
         (lambda: OffspringNiches(5, 0), "lineages is 0, but must be at least 1"),
         (
             lambda: Walks(ARM, MUTATE, WalkConfig(metric=OffspringNiches())),
