@@ -17,9 +17,7 @@ from nichechain.niches import CVTNiches, GridNiches
 from nichechain.pyribs import Recording, from_ribs, record, to_ribs
 from nichechain.search.parents import curiosity
 
-from .searches import RANGES, cvt, evaluate, grid, run, search
-
-INITIAL = np.random.default_rng(2).uniform(-1.5, 1.5, (40, 5))
+from .searches import INITIAL, RANGES, cvt, evaluate, grid, run, search
 
 
 def recorded(archive, iterations=12, **options):

@@ -9,9 +9,7 @@ from nichechain import NichechainError, variation
 from nichechain.pyribs import MutationEmitter, record
 from nichechain.variation import Bound
 
-from .searches import grid, run, search
-
-INITIAL = np.random.default_rng(2).uniform(-1.5, 1.5, (40, 5))
+from .searches import INITIAL, grid, run, search
 
 
 def test_children_are_in_the_neighbourhood_of_their_parents():
