@@ -52,6 +52,7 @@ SMOKE = (
 PEERS = (
     "tests/archive/test_exports.py",
     "tests/chain/structure",
+    "tests/domains/test_descriptors.py",
     "tests/domains/test_gym.py",
     "tests/execution/test_ray.py",
     "tests/plots/test_explorer_browser.py",

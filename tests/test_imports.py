@@ -41,6 +41,10 @@ def test_making_a_domain_loads_no_physics() -> None:
     assert imported(statement, SEARCH) == []
 
 
+def test_no_simulator_is_imported_before_it_is_asked_for() -> None:
+    assert imported("import nichechain.domains", ("torch", "gymnasium", "mujoco", "numba")) == []
+
+
 def test_checks_above_can_fail() -> None:
     assert imported("import numpy", HEAVY) == ["numpy"]
 
