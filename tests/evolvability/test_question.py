@@ -1,0 +1,75 @@
+"""Questions to a chain: which cannot be asked, what a long one says before, which rows it draws."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from nichechain import NicheChain, NichechainError, l_evolvability, niche_evolvability
+from nichechain.evolvability import question
+
+from .samples import T
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"l": 0}, "l is 0, but must be at least 1"),
+        ({"l": -2}, "l is -2"),
+        ({"l": 1.5}, "l is 1.5"),
+        ({"lineages": 0}, "lineages is 0, but must be at least 1"),
+        ({"lineages": -1}, "lineages is -1"),
+        ({"lineages": 2.5}, "lineages is 2.5"),
+        ({"method": "exactly"}, "method is 'exactly', but must be one of auto, exact, monte-carlo"),
+        ({"convention": "literal"}, "convention is 'literal', but must be one of definition, procedure"),
+        ({"repeats": 0}, "repeats is 0"),
+        ({"draws": 0}, "draws is 0"),
+    ],
+)
+def test_bad_arguments(arguments, message):
+    chain = NicheChain(T)
+    with pytest.raises(NichechainError, match=message):
+        l_evolvability(chain, niche=0, **arguments)
+    with pytest.raises(NichechainError, match=message):
+        niche_evolvability(chain, **arguments)
+
+
+@pytest.mark.parametrize(
+    ("root", "message"),
+    [
+        ({}, "either a niche or the distribution"),
+        ({"niche": 0, "offspring": [1, 0, 0]}, "either a niche or the distribution"),
+        ({"niche": 3}, "niche is 3, but this chain has niches 0 to 2"),
+        ({"niche": -1}, "niche is -1"),
+        ({"niche": (0, 1)}, "no grid"),
+        ({"offspring": [0.5, 0.5]}, r"shape \(2,\), but must be \(3,\)"),
+        ({"offspring": [[0.5, 0.5, 0]]}, r"shape \(1, 3\)"),
+        ({"offspring": [0.5, 0.4, 0]}, "sums to 0.9"),
+        ({"offspring": [1.5, -0.5, 0]}, "not negative"),
+        ({"offspring": [np.nan, 0.5, 0.5]}, "offspring"),
+        ({"offspring": [3, 4, 5]}, "sums to 12"),
+    ],
+)
+def test_bad_roots(root, message):
+    with pytest.raises(NichechainError, match=message):
+        l_evolvability(NicheChain(T), **root)
+
+
+def test_what_could_take_over_ten_minutes_is_said_before(monkeypatch):
+    chain = NicheChain(np.full((3, 3), 1 / 3))
+    monkeypatch.setattr(question, "_LONG", 1e-9)
+    with pytest.warns(UserWarning, match=r"could take \d+ minutes: fewer roots"):
+        l_evolvability(chain, niche=0)
+    with pytest.warns(UserWarning, match="could take"):
+        niche_evolvability(chain, method="monte-carlo", repeats=2)
+
+
+def test_rows_of_elites_do_not_depend_on_who_else_is_asked_for():
+    rows = np.random.default_rng(0).dirichlet(np.full(40, 0.5), 40)
+    drawn = question.DrawnChain(rows, rows, 9.0, seed=3, number=2)
+    some = np.array([39, 3, 17, 16])
+    whole = drawn.children(np.arange(40))
+    np.testing.assert_array_equal(drawn.children(some), whole[some])
+    np.testing.assert_allclose(whole.sum(axis=1), 1.0)
+    other = question.DrawnChain(rows, rows, 9.0, seed=3, number=1).children(some)
+    assert np.abs(other - whole[some]).max() > 0.1
