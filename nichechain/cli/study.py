@@ -117,7 +117,7 @@ def run(arguments: Sequence[str]) -> int:
 
 def _stored(command: ResumeSearchesCommand) -> SelectionStudy:
     from nichechain.archive.trust import check_trusted
-    from nichechain.studies.searches.running import read_study
+    from nichechain.studies.searches.folder import read_study
 
     study = read_study(command.path)
     check_trusted(study.config, command.path)
@@ -150,8 +150,8 @@ def _search(study: SelectionStudy, folder: Path, command: SelectionCommand | Res
 
 def _report(folder: Path) -> int:
     """Write the report of what is made so far, and tell what it found."""
+    from nichechain.studies.searches.folder import read_searches
     from nichechain.studies.searches.report import FILES, worth_table, write_selection_report
-    from nichechain.studies.searches.running import read_searches
 
     study, records = read_searches(folder)
     with progress.spinner("comparing and drawing"):

@@ -238,7 +238,7 @@ def _begin(command: _Study, kind: Kind) -> int:
 def _resume(command: ResumeCommand) -> int:
     from nichechain.archive.trust import check_trusted
     from nichechain.search.config import BuildConfig
-    from nichechain.studies.running import read_study
+    from nichechain.studies.folder import read_study
 
     study = read_study(command.path)
     same = BuildConfig(study.domain, study.shape, study.bounds, domain_options=study.domain_options)
@@ -269,8 +269,8 @@ def _walk(study: Study, domain: Domain, folder: Path, command: _Walks | ResumeCo
 def _report(folder: Path) -> int:
     """Write the report of what is walked so far, and tell what it found."""
     from nichechain.studies.findings import find
+    from nichechain.studies.folder import read_records, read_study, read_unit
     from nichechain.studies.report import FILES, write_report
-    from nichechain.studies.running import read_records, read_study, read_unit
 
     study, unit = read_study(folder), read_unit(folder)
     records = read_records(folder, study)

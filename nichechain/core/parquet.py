@@ -1,4 +1,4 @@
-"""Small Parquet files, read without a thread of anybody's pool."""
+"""Small Parquet files: read without a thread of anybody's pool, written with checksums."""
 
 from __future__ import annotations
 
@@ -28,3 +28,11 @@ def read_parquet(source: Path | pa.NativeFile, *, checksums: bool = False) -> pa
     """
     with pq.ParquetFile(source, pre_buffer=False, page_checksum_verification=checksums) as file:
         return file.read(use_threads=False)
+
+
+def parquet_bytes(table: pa.Table) -> bytes:
+    """A table as the content of a file, each page with a checksum."""
+    content = pa.BufferOutputStream()
+    pq.write_table(table, content, compression="zstd", write_page_checksum=True)
+    written: bytes = content.getvalue().to_pybytes()
+    return written

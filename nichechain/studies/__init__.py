@@ -8,8 +8,10 @@ from nichechain.core.lazy import lazily
 
 if TYPE_CHECKING:
     from nichechain.studies.conditions import Condition, condition_seed, pressure_of, selection_of
+    from nichechain.studies.folder import read_births, read_records, read_study
     from nichechain.studies.initialisation import initialise
-    from nichechain.studies.running import is_study, read_births, read_records, read_study, run
+    from nichechain.studies.running import run
+    from nichechain.studies.stored import is_study
     from nichechain.studies.study import (
         LEVELS,
         METRICS,
@@ -24,8 +26,10 @@ if TYPE_CHECKING:
 __getattr__, __dir__ = lazily(
     __name__,
     conditions="Condition condition_seed pressure_of selection_of",
+    folder="read_births read_records read_study",
     initialisation="initialise",
-    running="is_study read_births read_records read_study run",
+    running="run",
+    stored="is_study",
     study="LEVELS METRICS VARIATIONS Study metric_conditions pressure_conditions variations",
 )
 

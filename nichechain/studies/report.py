@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pyarrow as pa
-import pyarrow.parquet as pq
 
 from nichechain.core.intervals import LEVEL
 from nichechain.core.machine import library_versions, machine
+from nichechain.core.parquet import parquet_bytes
 from nichechain.studies import findings
 from nichechain.studies.analysis import Analysis, analyse, plain, varied
 from nichechain.studies.document import write_files
@@ -76,10 +76,8 @@ def write_report(
     picture = _drawn(figure, "png")
     document = compose(analysis, command=command, unit=unit, figure=FIGURE, versions=versions)
     statistics = to_json(analysis, command=command, versions=versions, resamples=resamples)
-    content = io.BytesIO()
-    pq.write_table(records, content, compression="zstd", write_page_checksum=True)
     files = {
-        RECORDS: content.getvalue(),
+        RECORDS: parquet_bytes(records),
         FIGURE: picture,
         VECTOR: _drawn(figure, "svg"),
         MARKDOWN: document.markdown().encode(),

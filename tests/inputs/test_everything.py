@@ -43,7 +43,7 @@ CALLS: tuple[Call, ...] = sum(
     (),
 )
 
-# Their options have a table of their own, tests/inputs/test_cli.py.
+# Their options have a table of their own, tests/inputs/commands.py.
 # What needs an extra is tried beside its tests.
 _ELSEWHERE = ("nichechain.cli", "nichechain.qdax")
 
@@ -240,7 +240,7 @@ EXEMPT: dict[tuple[str, str], str] = {
             "tried one by one: joints, noise, repeats, and one that is not there",
         ),
         ("execution.ray.Ray", "address cache_memory", _LATER),
-        ("studies.running.is_study", "folder", "asks whether there is one: any path has an answer"),
+        ("studies.stored.is_study", "folder", "asks whether there is one: any path has an answer"),
         ("studies.running.run", "folder", _LATER),
         ("studies.study.Study", "domain domain_options", _LATER),
         ("landscape.archives.measure_archive", "keep", _LATER),

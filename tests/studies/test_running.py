@@ -29,6 +29,7 @@ from nichechain.studies import (
     run,
     running,
 )
+from nichechain.studies.folder import write_study
 from nichechain.walks import run_seed, walk
 
 ARM = domains.make("arm")
@@ -187,14 +188,14 @@ def test_fifty_kills(tmp_path: Path) -> None:
         folder = tmp_path / f"killed-{attempt}"
         attempt += 1
         folder.mkdir()
-        running._write_study(folder, study, ARM.unit)
+        write_study(folder, study, ARM.unit)
         hit += kill_until_done(folder, rng, 10, 0.4)
         finish(study, folder)
         assert files(folder) == files(expected)
 
 
 def test_a_kill(whole: Path, tmp_path: Path) -> None:
-    running._write_study(tmp_path, STUDY, ARM.unit)
+    write_study(tmp_path, STUDY, ARM.unit)
     kill_until_done(tmp_path, np.random.default_rng(1), 1, 0.05)
     assert files(finish(STUDY, tmp_path)) == files(whole)
 
@@ -266,7 +267,7 @@ def test_damage_is_named(tmp_path: Path) -> None:
     study = tmp_path / "study.json"
     text = study.read_text()
     study.write_text(text[: len(text) // 2])
-    with pytest.raises(ArchiveError, match=r"study.json is damaged"):
+    with pytest.raises(ArchiveError, match=r"study.json is no study of walks, or damaged"):
         read_study(tmp_path)
     study.write_text(text.replace('"format": 1', '"format": 9'))
     with pytest.raises(ArchiveError, match="has format 9"):
@@ -290,6 +291,6 @@ def test_damage_of_what_is_under_way_is_named(tmp_path: Path) -> None:
 def test_no_study_and_no_walks(tmp_path: Path) -> None:
     with pytest.raises(ArchiveError, match="holds no study"):
         read_study(tmp_path)
-    running._write_study(tmp_path, STUDY, ARM.unit)
+    write_study(tmp_path, STUDY, ARM.unit)
     with pytest.raises(ArchiveError, match="no finished walks yet"):
         read_records(tmp_path)

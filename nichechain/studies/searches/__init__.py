@@ -8,13 +8,15 @@ from nichechain.core.lazy import lazily
 
 if TYPE_CHECKING:
     from nichechain.studies.searches.comparing import compare_selections
-    from nichechain.studies.searches.running import read_searches, run_searches
+    from nichechain.studies.searches.folder import read_searches
+    from nichechain.studies.searches.running import run_searches
     from nichechain.studies.searches.study import SelectionStudy
 
 __getattr__, __dir__ = lazily(
     __name__,
     comparing="compare_selections",
-    running="read_searches run_searches",
+    folder="read_searches",
+    running="run_searches",
     study="SelectionStudy",
 )
 

@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pyarrow as pa
-import pyarrow.parquet as pq
 
 from nichechain.core.machine import library_versions
+from nichechain.core.parquet import parquet_bytes
 from nichechain.studies.analysis import plain
 from nichechain.studies.document import (
     Bullets,
@@ -61,8 +61,6 @@ def write_selection_report(
     worths = compare_selections(study, records)
     picture = _drawn(_figure(study, worths, records))
     document = compose(study, worths, command)
-    content = io.BytesIO()
-    pq.write_table(records, content, compression="zstd", write_page_checksum=True)
     statistics = plain(
         {
             "format": _FORMAT,
@@ -73,7 +71,7 @@ def write_selection_report(
         }
     )
     files = {
-        RECORDS: content.getvalue(),
+        RECORDS: parquet_bytes(records),
         FIGURE: picture,
         MARKDOWN: document.markdown().encode(),
         PAGE: document.html({FIGURE: picture}).encode(),
