@@ -8,7 +8,7 @@ from typing import Annotated, Literal, get_args, get_type_hints
 
 import tyro
 
-from nichechain.cli import COMMANDS, module_of, parsing
+from nichechain.cli import COMMANDS, begun, module_of, parsing
 
 _BASH = """_nichechain() {{
     local word="${{COMP_WORDS[COMP_CWORD]}}" options
@@ -48,14 +48,15 @@ def run(arguments: Sequence[str]) -> int:
 
 
 def _words(command: str) -> Iterator[str]:
-    """Options of a command, and the studies of ``walks`` with those of all."""
+    """Options of a command, and what ``walks`` and ``study`` can be asked for, with the options of all."""
     module = module_of(command)
+    homes = (module.__name__, begun.__name__)
     made = [
         value
         for value in vars(module).values()
-        if isinstance(value, type) and is_dataclass(value) and value.__module__ == module.__name__
+        if isinstance(value, type) and is_dataclass(value) and value.__module__ in homes
     ]
-    if command == "walks":
+    if command in ("walks", "study"):
         yield from (parsing.called(each) for each in made if not each.__name__.startswith("_"))
     seen: set[str] = set()
     for each in made:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import tyro
 
 from nichechain.cli import output, parsing, progress
+from nichechain.cli.begun import ReportCommand, ResumeCommand, stopped
 from nichechain.cli.build import BuildCommand
 from nichechain.core.errors import NichechainError
 from nichechain.search.config import ObjectiveName, SearchConfig
@@ -78,26 +79,6 @@ class SelectionCommand(BuildCommand):
         return SelectionStudy(self.config(), self.selections, self.runs, self.elites, self.offspring)
 
 
-@dataclass(frozen=True)
-class ResumeSearchesCommand:
-    """Go on with a study that was begun."""
-
-    path: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="PATH")]
-    """Folder of the study."""
-    runs: Annotated[int | None, parsing.option("INT", "as many as were asked for")] = None
-    """Searches with each selection."""
-    workers: parsing.Workers = None
-    cache_memory: parsing.CacheMemory = None
-
-
-@dataclass(frozen=True)
-class ReportSearchesCommand:
-    """Tables, figure and report of a study, as far as it is."""
-
-    path: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="PATH")]
-    """Folder of the study."""
-
-
 def run(arguments: Sequence[str]) -> int:
     """Make the searches of a study, then report on them."""
     if not arguments or arguments[0] in ("-h", "--help"):
@@ -105,9 +86,9 @@ def run(arguments: Sequence[str]) -> int:
         return 0
     verb, rest = arguments[0], arguments[1:]
     if verb == "report":
-        return _report(parsing.parse(ReportSearchesCommand, rest, name="study report").path)
+        return _report(parsing.parse(ReportCommand, rest, name="study report").path)
     if verb == "resume":
-        resume = parsing.parse(ResumeSearchesCommand, rest, name="study resume")
+        resume = parsing.parse(ResumeCommand, rest, name="study resume")
         return _search(_stored(resume), resume.path, resume)
     if verb == "selection":
         command = parsing.parse(SelectionCommand, rest, name="study selection")
@@ -115,7 +96,7 @@ def run(arguments: Sequence[str]) -> int:
     raise NichechainError(f"there is no study {verb!r}: it must be one of selection, resume or report")
 
 
-def _stored(command: ResumeSearchesCommand) -> SelectionStudy:
+def _stored(command: ResumeCommand) -> SelectionStudy:
     from nichechain.archive.trust import check_trusted
     from nichechain.studies.searches.folder import read_study
 
@@ -124,7 +105,7 @@ def _stored(command: ResumeSearchesCommand) -> SelectionStudy:
     return study if command.runs is None else replace(study, runs=command.runs)
 
 
-def _search(study: SelectionStudy, folder: Path, command: SelectionCommand | ResumeSearchesCommand) -> int:
+def _search(study: SelectionStudy, folder: Path, command: SelectionCommand | ResumeCommand) -> int:
     from nichechain import execution
     from nichechain.search.making import make_domain
     from nichechain.studies.searches.running import run_searches
@@ -139,9 +120,7 @@ def _search(study: SelectionStudy, folder: Path, command: SelectionCommand | Res
             with progress.counting(study.evaluations, "evaluations") as tell:
                 elsewhere = run_searches(study, folder, executor, domain=domain, on_progress=tell)
         except KeyboardInterrupt:
-            again = f"nichechain study resume {shlex.quote(str(folder))}"
-            output.console().print(f"Stopped; what was made is kept. To go on:\n  {again}")
-            return 130
+            return stopped("study", folder)
     if elsewhere:
         output.console().print(f"{elsewhere} searches are being made by other processes.")
         return 0

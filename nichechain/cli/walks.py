@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 import tyro
 
 from nichechain.cli import output, parsing, progress
+from nichechain.cli.begun import ReportCommand, ResumeCommand, stopped
 from nichechain.core.errors import NichechainError
 from nichechain.studies.settings import MetricName, WalkSettings
 
@@ -180,26 +181,6 @@ class PopulationCommand(_Walks):
         return metric_conditions(parsing.words(self.metrics), self.base())
 
 
-@dataclass(frozen=True)
-class ResumeCommand:
-    """Go on with a study that was begun."""
-
-    path: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="PATH")]
-    """Folder of the study."""
-    runs: Annotated[int | None, parsing.option("INT", "as many as were asked for")] = None
-    """Walks of each kind."""
-    workers: parsing.Workers = None
-    cache_memory: parsing.CacheMemory = None
-
-
-@dataclass(frozen=True)
-class ReportCommand:
-    """Tables, tests, figure and report of a study that was walked, or is being walked."""
-
-    path: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="PATH")]
-    """Folder of the study."""
-
-
 _Study = PressureCommand | MetricsCommand | SensitivityCommand | PopulationCommand
 
 
@@ -259,10 +240,7 @@ def _walk(study: Study, domain: Domain, folder: Path, command: _Walks | ResumeCo
             with progress.counting(study.evaluations, "evaluations") as tell:
                 walk_study(study, folder, executor, domain=domain, on_progress=tell)
         except KeyboardInterrupt:
-            output.console().print(
-                f"Stopped; every finished step is kept. To go on:\n  nichechain walks resume {folder}"
-            )
-            return 130
+            return stopped("walks", folder)
     return _report(folder)
 
 

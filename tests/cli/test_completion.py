@@ -27,6 +27,7 @@ def test_bash(capsys):
     assert complete(script, "nichechain", "build", "--eval") == ["--evaluations"]
     assert "--lineages" in complete(script, "nichechain", "evolvability", "--")
     assert {"pressure", "metrics", "resume"} <= set(complete(script, "nichechain", "walks", ""))
+    assert {"selection", "resume", "report"} <= set(complete(script, "nichechain", "study", ""))
     assert "--archive-scope" in complete(script, "nichechain", "walks", "--arch")
     # Positional arguments are no options.
     assert "--path" not in complete(script, "nichechain", "info", "--")
