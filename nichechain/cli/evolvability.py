@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from nichechain.cli import meta, output, parsing, progress
 from nichechain.core.checks import check_at_least
 from nichechain.core.errors import NichechainError
+from nichechain.core.text import some
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -305,8 +306,8 @@ def _write(frame: pd.DataFrame, command: EvolvabilityCommand, drift: str) -> Non
     first = frame.iloc[0]
     shown = output.console()
     shown.print(
-        f"[bold]{command.l}-evolvability[/]: niches that {command.lineages} lineages of {command.l} "
-        "generations reach"
+        f"[bold]{command.l}-evolvability[/]: niches that {some(command.lineages, 'lineage')} of "
+        f"{some(command.l, 'generation')} {'reaches' if command.lineages == 1 else 'reach'}"
     )
     shown.print(
         f"[dim]estimator: {first.estimator}; convention: {first.convention}; method: {first.method}[/]"

@@ -192,9 +192,10 @@ def called(command: Callable[..., Command]) -> str:
     return command.__name__.removesuffix("Command").lower()
 
 
-def option(metavar: str, default: str) -> Any:
-    """How the help shows an option whose default is worked out later."""
-    return tyro.conf.arg(metavar=metavar, help_behavior_hint=f"(default: {default})")
+def option(metavar: str, default: str | None) -> Any:
+    """How the help shows an option whose default is worked out later; None is of one that must be given."""
+    hint = "(required)" if default is None else f"(default: {default})"
+    return tyro.conf.arg(metavar=metavar, help_behavior_hint=hint)
 
 
 def parsed(option: str, read: Callable[[str, str], Any]) -> Any:

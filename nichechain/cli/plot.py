@@ -52,8 +52,9 @@ class PlotCommand:
     ]
     """What to draw. Maps of niches: elites, visits (births), evolvability, uncertainty (with its interval
     beside it), reach (where descendants of --niche go), classes (communicating ones, of observed
-    transitions). Graphs: reachability (which niches lead to which), wormholes. Curves against l and U:
-    growth. Matrices: transitions, transitions-by-class."""
+    transitions). Graphs: reachability (which niches lead to which; a long jump is over a quarter of the
+    grid's diagonal), wormholes. Curves against l and U: growth. Matrices: transitions,
+    transitions-by-class."""
     out: Annotated[Path | None, parsing.option("FILE", "KIND.png")] = None
     """Picture to write: .png, .svg or .pdf."""
     l: int = 5
@@ -68,7 +69,7 @@ class PlotCommand:
     estimator: parsing.EstimatorName = "empirical-bayes"
     """How T is estimated; classes are always those of mle, as a posterior has no zeros."""
     min_births: int = 20
-    """Niches with fewer births behind their row of T are crossed out, for evolvability."""
+    """Niches with fewer births behind their row of T are hatched, for evolvability."""
     steps: parsing.Steps = None
     dpi: int = 200
     """Resolution of a .png."""

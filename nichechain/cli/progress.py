@@ -67,11 +67,9 @@ def build_progress(total: int, name: str = "") -> Iterator[Callable[[BuildProgre
         def line(now: BuildProgress) -> None:
             clock.begin(now.births)
             if lines.due():
-                left = clock.seconds_left(now.births, total)
                 _say(
-                    f"{name and name + ': '}{now.births} of {total} births, {clock.rate(now.births)}/s, "
-                    f"{now.filled} niches filled, {now.outside} outside, {now.failed} failed, "
-                    f"{left:.0f} s left"
+                    f"{name and name + ': '}{now.births} of {total} births, {now.filled} niches filled, "
+                    f"{now.outside} outside, {now.failed} failed{clock.pace(now.births, total)}"
                 )
 
         yield line
@@ -116,8 +114,7 @@ def counting(total: int, what: str) -> Iterator[Callable[[int], None]]:
         def line(done: int) -> None:
             clock.begin(done)
             if lines.due():
-                left = clock.seconds_left(done, total)
-                _say(f"{done} of {total} {what}, {clock.rate(done)}/s, {left:.0f} s left")
+                _say(f"{done} of {total} {what}{clock.pace(done, total)}")
 
         yield line
         return
@@ -162,8 +159,7 @@ def stages() -> Iterator[Callable[[str, int, int], None]]:
             clock = clocks.setdefault(stage, _Clock())
             clock.begin(done)
             if done and lines.due():
-                left = clock.seconds_left(done, total)
-                _say(f"{stage}: {done} of {total}, {clock.rate(done)}/s, {left:.0f} s left")
+                _say(f"{stage}: {done} of {total}{clock.pace(done, total)}")
 
         yield line
         return
@@ -241,7 +237,7 @@ class _Clock:
         speed = self._speed(births)
         return f"{speed:.1f}" if speed < 100 else f"{speed:.0f}"
 
-    def seconds_left(self, births: int, total: int) -> float:
-        """Time that the rest will take at this speed."""
+    def pace(self, births: int, total: int) -> str:
+        """Rate and time left, to end a line with; nothing while nothing was done since the clock began."""
         speed = self._speed(births)
-        return (total - births) / speed if speed else 0.0 if births >= total else float("inf")
+        return f", {self.rate(births)}/s, {(total - births) / speed:.0f} s left" if speed else ""

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from nichechain.cli import output, parsing, progress
 from nichechain.core.checks import check_at_least
+from nichechain.core.text import some
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -100,7 +101,8 @@ def _show(frame: pd.DataFrame, command: TableCommand, known: int) -> None:
     shown = output.console()
     shown.print(f"[bold]{len(frame)} of {known} niches[/] that births fell in, by {command.by}")
     shown.print(
-        f"[dim]reached: by {command.lineages} lineages of {command.l} generations, by {command.estimator}[/]"
+        f"[dim]reached: by {some(command.lineages, 'lineage')} of {some(command.l, 'generation')}, "
+        f"by {command.estimator}[/]"
     )
     headings = ("niche", "born\nin", "born\nof", "curiosity", "reached", "90 %\ninterval")
     table = output.table(*headings, "wormholes", "r*")

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from nichechain.cli import output, parsing, progress
 from nichechain.core.errors import NichechainError
+from nichechain.core.text import some
 
 if TYPE_CHECKING:
     from nichechain.validation import Validation, ValidationConfig
@@ -101,8 +102,8 @@ def _show(result: Validation, config: ValidationConfig) -> None:
     )
     direct = result.direct
     shown.print(
-        f"\n[bold]Is it right?[/] {config.lineages} lineages of {config.l} generations, really run, "
-        f"from each of {len(direct.reached)} elites"
+        f"\n[bold]Is it right?[/] {some(config.lineages, 'lineage')} of {some(config.l, 'generation')}, "
+        f"really run, from each of {len(direct.reached)} elites"
     )
     shown.print(f"[dim]estimator: {direct.estimator}; convention: definition[/]")
     if direct.lineages.failed:

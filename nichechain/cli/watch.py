@@ -20,7 +20,7 @@ class WatchCommand:
     """
 
     path: parsing.ArchivePath
-    niche: Annotated[str | None, parsing.option("I,J", "required")] = None
+    niche: Annotated[str | None, parsing.option("I,J", None)] = None
     """Niche whose elite is watched."""
     out: Path = Path("episode.gif")
     """Film to write: .gif, or .mp4 where ffmpeg is installed. Or .png: six moments of a film, or the

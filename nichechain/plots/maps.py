@@ -96,7 +96,7 @@ def plot_evolvability(
     ax : matplotlib.axes.Axes, optional
         By default one of its own.
     min_births : int
-        Niches with fewer births behind their row of T are crossed out: their value is mostly
+        Niches with fewer births behind their row of T are hatched: their value is mostly
         the prior's.
 
     Returns
