@@ -2,7 +2,7 @@
 
 Both nodes are on this machine, with one processor each: Ray's own utility for testing clusters
 starts them. On a real cluster this script needs none of that, only ``execution.make("ray")`` on
-the head node. It needs ``pip install 'nichechain[ray]'`` and takes about half a minute.
+the head node. It needs nichechain's extra ``ray`` and takes about half a minute.
 """
 
 import os

@@ -1,9 +1,8 @@
 """A pyribs script that learns which postures lead furthest, with three added lines.
 
 The search is the well-known arm repertoire: reach every place with the smoothest posture. What is
-added for nichechain is marked with ``# +``. Run it anywhere after installing nichechain and
-``pip install 'nichechain[visualize]'``; it takes about half a minute and leaves ``pyribs_arm.png`` in the
-current folder.
+added for nichechain is marked with ``# +``. Run it anywhere after installing nichechain with its extra
+``visualize``; it takes about half a minute and leaves ``pyribs_arm.png`` in the current folder.
 """
 
 import tempfile

@@ -1,8 +1,8 @@
 """MAP-Elites of QDax inside ``jit`` and ``scan``, recorded by three added lines.
 
 The search is QDax's arm repertoire. What is added for nichechain is marked with ``# +``. Run it anywhere
-after ``pip install 'nichechain[qdax]'``; it takes some seconds on a CPU and leaves ``qdax_arm.png`` in the
-current folder.
+after installing nichechain with its extra ``qdax``; it takes some seconds on a CPU and leaves
+``qdax_arm.png`` in the current folder.
 """
 
 import functools
