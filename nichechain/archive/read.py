@@ -26,6 +26,7 @@ from nichechain.archive.stored_state import parse_state
 from nichechain.archive.trust import check_origin
 from nichechain.births.table import LINEAGE
 from nichechain.core.errors import ArchiveError
+from nichechain.core.files import ARCHIVE_MARK
 from nichechain.core.text import printable_values
 from nichechain.domains.base import Domain
 from nichechain.niches import Niches
@@ -35,7 +36,7 @@ from nichechain.search.lineages import Calibration
 from nichechain.search.making import make_niches
 
 FORMAT = 1
-META = "meta.json"
+META = ARCHIVE_MARK
 BIRTHS = "births"
 CENTROIDS = "centroids.npy"
 _ELITES_NAME = r"elites-[0-9]{9,18}\.npz"

@@ -50,7 +50,7 @@ from nichechain.archive.read import (
 )
 from nichechain.births.table import LINEAGE
 from nichechain.core.errors import ArchiveError
-from nichechain.core.files import write_atomically
+from nichechain.core.files import STUDY_MARK, keep_apart, write_atomically
 from nichechain.core.machine import library_versions, machine
 from nichechain.niches import CVTNiches, Niches
 from nichechain.search import savings
@@ -88,6 +88,7 @@ class Writer:
         niches: Niches | None = None,
         calibrations: Sequence[Calibration] = (),
     ) -> None:
+        keep_apart(folder, STUDY_MARK)
         self._folder = folder
         self._config = config
         self._facts = facts
@@ -232,7 +233,14 @@ class Writer:
 
 
 def clear(folder: Path) -> None:
-    """Remove an archive's files from a folder, and nothing else."""
+    """Remove an archive's files from a folder, and nothing else.
+
+    Raises
+    ------
+    ArchiveError
+        If it is the folder of a study.
+    """
+    keep_apart(folder, STUDY_MARK)
     (folder / META).unlink(missing_ok=True)
     (folder / f"{META}.tmp").unlink(missing_ok=True)
     (folder / savings.FILE).unlink(missing_ok=True)

@@ -11,6 +11,28 @@ from pathlib import Path
 
 from nichechain.core.errors import ArchiveError, NichechainError
 
+# The file by which a folder is known to hold an archive, or a study.
+ARCHIVE_MARK, STUDY_MARK = "meta.json", "study.json"
+
+
+def keep_apart(folder: Path, mark: str) -> None:
+    """Refuse a folder that holds the other thing: archives and studies have folders of the same names.
+
+    Parameters
+    ----------
+    folder : Path
+    mark : str
+        :data:`ARCHIVE_MARK` where a study is to be written, :data:`STUDY_MARK` where an archive is.
+
+    Raises
+    ------
+    ArchiveError
+        If it has that file.
+    """
+    if (folder / mark).is_file():
+        held, wanted = ("an archive", "a study") if mark == ARCHIVE_MARK else ("a study", "an archive")
+        raise ArchiveError(f"{folder} holds {held}, but {wanted} needs a folder of its own")
+
 
 def write_atomically(path: Path, content: bytes) -> None:
     """Write a file so that whoever reads it finds the whole of it, even after a crash.

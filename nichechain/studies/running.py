@@ -14,7 +14,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from nichechain.core.errors import ArchiveError
-from nichechain.core.files import writing
+from nichechain.core.files import ARCHIVE_MARK, keep_apart, writing
 from nichechain.core.randomness import Purpose, keyed
 from nichechain.domains.base import Domain
 from nichechain.execution import Executor
@@ -71,13 +71,14 @@ def run(
     Raises
     ------
     ArchiveError
-        If the folder holds another study, is damaged, or is being written.
+        If the folder holds another study or an archive, is damaged, or is being written.
     NichechainError
         If the domain is unknown or a start fails to evaluate.
     """
     folder = Path(folder)
     domain = domain or study.make_domain()
     with writing(folder):
+        keep_apart(folder, ARCHIVE_MARK)
         if is_study(folder):
             _check_extends(read_study(folder), study, folder)
         write_study(folder, study, domain.unit)

@@ -10,11 +10,11 @@ from typing import Any, Protocol, TypeVar
 import pyarrow as pa
 
 from nichechain.core.errors import ArchiveError, NichechainError
-from nichechain.core.files import write_atomically
+from nichechain.core.files import STUDY_MARK, write_atomically
 from nichechain.core.machine import library_versions
 from nichechain.core.parquet import read_parquet
 
-_FILE = "study.json"
+_FILE = STUDY_MARK
 _FORMAT = 1
 
 Read = TypeVar("Read")

@@ -13,7 +13,8 @@ import pyarrow.compute as pc
 import pytest
 from numpy.typing import NDArray
 
-from nichechain import Threads, births, domains
+from nichechain import BuildConfig, Threads, births, build, domains
+from nichechain.archive import write
 from nichechain.core.errors import ArchiveError
 from nichechain.core.randomness import Purpose, keyed
 from nichechain.domains.base import Domain, Evaluation
@@ -207,6 +208,21 @@ def test_another_study_is_refused(whole: Path) -> None:
     with pytest.raises(ArchiveError, match="differs in conditions"):
         finish(dataclasses.replace(STUDY, conditions=STUDY.conditions[:2]), whole)
     assert files(whole) == before
+
+
+def test_an_archive_and_a_study_do_not_share_a_folder(whole: Path, archive_folder: Path) -> None:
+    study, archive = files(whole), files(archive_folder)
+    config = BuildConfig(domain="arm", shape=(5, 5), bounds=ARM.bounds, evaluations=300)
+    with (
+        Threads(1) as threads,
+        pytest.raises(ArchiveError, match="holds a study, but an archive needs a folder"),
+    ):
+        build(config, whole, threads)
+    with pytest.raises(ArchiveError, match="holds a study"):
+        write.clear(whole)
+    with pytest.raises(ArchiveError, match="holds an archive, but a study needs a folder of its own"):
+        finish(STUDY, archive_folder)
+    assert (files(whole), files(archive_folder)) == (study, archive)
 
 
 def test_runs_that_share_an_archive_stay_together(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -11,7 +11,7 @@ from pathlib import Path
 import pyarrow as pa
 
 from nichechain.core.errors import ArchiveError
-from nichechain.core.files import write_atomically
+from nichechain.core.files import ARCHIVE_MARK, keep_apart, write_atomically
 from nichechain.core.parquet import parquet_bytes
 from nichechain.studies.searches.study import OneSearch, SelectionStudy
 from nichechain.studies.stored import check_continues, is_study, read_rows, read_stored, write_stored
@@ -25,8 +25,9 @@ def begin(study: SelectionStudy, folder: Path) -> None:
     Raises
     ------
     ArchiveError
-        If the folder holds another study, or cannot be written to.
+        If the folder holds another study or an archive, or cannot be written to.
     """
+    keep_apart(folder, ARCHIVE_MARK)
     try:
         for name in (_SEARCHES, _RECORDS):
             (folder / name).mkdir(parents=True, exist_ok=True)

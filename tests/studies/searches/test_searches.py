@@ -92,6 +92,15 @@ def test_more_runs_may_be_asked_for_and_nothing_else(folder, tmp_path):
             run_searches(other, tmp_path, executor)
 
 
+def test_an_archive_stays_alone_in_its_folder(tmp_path):
+    with Threads(1) as executor:
+        build(replace(CONFIG, evaluations=150), tmp_path, executor)
+        before = sorted(tmp_path.rglob("*"))
+        with pytest.raises(NichechainError, match="holds an archive, but a study needs a folder of its own"):
+            run_searches(STUDY, tmp_path, executor)
+    assert sorted(tmp_path.rglob("*")) == before
+
+
 def records_of(**searches: list[int]) -> pa.Table:
     """Niches filled after every ten births of some searches, named by selection and run."""
     tables = []
