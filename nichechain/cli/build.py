@@ -124,7 +124,8 @@ class BuildCommand(SearchConfig):
     out: Annotated[Path | None, parsing.option("PATH", "archives/DOMAIN-seedSEED")] = None
     """Archive folder."""
     resume: bool = False
-    """Go on with the archive that the folder holds, to its own budget or a larger --evaluations."""
+    """Go on with the archive that the folder holds, to its own budget or a larger --evaluations. Where it
+    holds none, one is begun."""
     force: bool = False
     """Start over, removing the archive that the folder holds."""
 
@@ -213,6 +214,9 @@ def run(arguments: Sequence[str]) -> int:
         sys.path.append(here)
     searches = asked_for(command, arguments)
     shown = output.console()
+    if command.resume and not any(read.is_archive(search.folder) for search in searches):
+        # Perhaps the name of the folder was misspelled.
+        shown.print(f"{searches[0].folder} holds no archive to go on with: one is begun.")
     with execution.make(command.workers, command.cache_memory) as executor:
         for folder in (search.folder for search in searches if command.force):
             if folder.exists():

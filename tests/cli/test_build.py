@@ -74,10 +74,14 @@ def test_resume_refuses_another_configuration(tmp_path, capsys):
     assert contents(folder) == before
 
 
-def test_resume_without_an_archive_begins_one(tmp_path):
+def test_resume_without_an_archive_begins_one_and_says_so(tmp_path, capsys):
     folder = tmp_path / "arm"
+    said = "arm holds no archive to go on with: one is begun."
     assert main(build(folder, 200, "--resume")) == 0
+    assert said in " ".join(capsys.readouterr().out.split())
     assert nc.load(folder).meta.births == 200
+    assert main(build(folder, 300, "--resume")) == 0
+    assert said not in " ".join(capsys.readouterr().out.split())
 
 
 @pytest.mark.parametrize(
