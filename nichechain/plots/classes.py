@@ -10,6 +10,7 @@ from scipy import sparse
 
 from nichechain.chain.structure.classes import communicating_classes, recurrent_classes
 from nichechain.core.errors import NichechainError
+from nichechain.core.text import some
 from nichechain.plots.cells import cells_along, fill, hatch
 from nichechain.plots.style import EDGE, EMPTY, INK, LONG_JUMP, START, axes_of, behavior_axes, colorbar, key
 
@@ -166,7 +167,7 @@ def plot_transitions_by_class(
     ax.set(xlabel="state of the child", ylabel="state of the parent")
     ax.tick_params(length=2, color=INK)
     colorbar(ax, picture, f"probability (white: under {_SMALLEST:g}, or no births)")
-    ax.set_title(f"T by communicating class: {len(several)} of several states, {alone} states alone")
+    ax.set_title(f"T by communicating class: {len(several)} of several states, {some(alone, 'state')} alone")
     key(ax, note=_note(chain, threshold))
     return ax
 
