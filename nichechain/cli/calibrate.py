@@ -10,6 +10,7 @@ from typing import Annotated
 import tyro
 
 from nichechain.cli import output, parsing, progress
+from nichechain.core.errors import NichechainError
 from nichechain.search.config import BROOD, MOST_FAILED
 
 
@@ -23,7 +24,7 @@ class CalibrateCommand:
 
     path: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="PATH")]
     """Archive folder."""
-    rollouts: Annotated[int | None, parsing.option("N", "none")] = None
+    rollouts: Annotated[int | None, parsing.option("N", "none, but given unless --resume is")] = None
     """How many births to add, such as 2000."""
     brood: int = BROOD
     """Lineages that begin at the same elite."""
@@ -40,7 +41,18 @@ def run(arguments: Sequence[str]) -> int:
     command = parsing.parse(CalibrateCommand, arguments)
     from nichechain import execution
     from nichechain.archive import read
-    from nichechain.archive.archive import load
+    from nichechain.archive.archive import load, shipped
+
+    if command.rollouts is None and not command.resume:
+        raise NichechainError(
+            "--rollouts is missing: give the number of births to add, such as --rollouts 2000, "
+            "or --resume where a calibration was stopped"
+        )
+    if not command.path.exists() and str(command.path) in shipped():
+        raise NichechainError(
+            f"{command.path} ships with nichechain, and calibrate adds to a folder of your own: copy the "
+            "archive that nichechain info names, and give the copy"
+        )
     from nichechain.archive.calibrating import calibrate
 
     shown = output.console()

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
 from nichechain.cli import output, parsing, progress
 from nichechain.core.checks import check_at_least
@@ -26,13 +27,13 @@ class ExploreCommand:
     """Lineages U that it shows first."""
     estimator: parsing.EstimatorName = "empirical-bayes"
     """How T is estimated."""
-    draws: int | None = None
-    """Posterior draws of T behind numbers and intervals. (default: 50, and 6 for over 1,000 niches)"""
+    draws: Annotated[int | None, parsing.option("INT", "50, and 6 for over 1,000 niches")] = None
+    """Posterior draws of T behind numbers and intervals."""
     seed: int = 0
     """Seed of the draws."""
-    films: Path | None = None
+    films: Annotated[Path | None, parsing.option("FOLDER", "none")] = None
     """Folder of what `nichechain watch` made, shown with the elites: 14,14.gif and so on."""
-    beside: parsing.ArchivePath | None = None
+    beside: Annotated[str | None, parsing.option("PATH", "none")] = None
     """A second archive to show beside the first."""
     steps: parsing.Steps = None
 

@@ -16,7 +16,7 @@ from nichechain.cli import output, parsing
 class MergeCommand:
     """Make one archive of several of one domain, niches and mutation: counts add, the largest key wins."""
 
-    paths: Annotated[tuple[str, ...], tyro.conf.Positional, tyro.conf.arg(metavar="PATH")]
+    paths: Annotated[tuple[str, ...], tyro.conf.Positional, parsing.option("PATH", None)]
     """Archive folders, at least two."""
     out: Annotated[Path, tyro.conf.arg(metavar="PATH")]
     """Archive folder to make. No build can go on with it."""

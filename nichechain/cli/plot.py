@@ -103,7 +103,7 @@ def run(arguments: Sequence[str]) -> int:
     figure = output.new_figure(*(_PAIRS[command.kind] if pair else (7.0, 7.4)))
     if pair:
         left, right = figure.subplots(
-            1, 2, gridspec_kw={"wspace": 0.45 if command.kind == "uncertainty" else 0.2}
+            1, 2, gridspec_kw={"wspace": 0.55 if command.kind == "uncertainty" else 0.2}
         )
         _draw_pair(command, archive, left, right)
     else:

@@ -1,6 +1,8 @@
 import json
 import shutil
 
+import pytest
+
 import nichechain as nc
 from nichechain.cli import main
 
@@ -23,3 +25,16 @@ def test_births_are_added_and_told_of(built, tmp_path, capsys):
     assert "1540 (complete, 40 of them added by calibrate)" in capsys.readouterr().out
     assert main(["build", "arm", "--out", str(folder), "--resume"]) == 2
     assert "no build can go on" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        (["nowhere"], "--rollouts is missing: give the number of births to add"),
+        (["fetch-pick-and-place", "--rollouts", "10"], "ships with nichechain"),
+    ],
+)
+def test_what_cannot_be_calibrated(given, said, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["calibrate", *given]) == 2
+    assert said in capsys.readouterr().err

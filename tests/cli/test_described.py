@@ -26,6 +26,13 @@ def test_help_fits_the_terminal(command, capsys, monkeypatch):
     assert max(map(len, lines[:begin])) <= 80
 
 
+@pytest.mark.parametrize("command", sorted(set(COMMANDS) - {"walks", "study"}))
+def test_help_says_defaults_in_words(command, capsys, monkeypatch):
+    text = " ".join(shown(capsys, monkeypatch, command, width=110).split())
+    for wrong in ("{None}", "(default: None)", "(default: )", "(default: required", ") (default:"):
+        assert wrong not in text
+
+
 def test_options_of_build_come_in_groups(capsys, monkeypatch):
     text = shown(capsys, monkeypatch, "build")
     # Where it is not known whether boxes can be drawn, a title stands over a line.
