@@ -179,7 +179,7 @@ class NearRows:
         offsets, states = self.neighbours.offsets, self.neighbours.states
         parts = []
         for kind, births in enumerate(self.births):
-            share = self.weights[kind] / (self._said[kind].sum(axis=0) + _IMAGINARY)
+            share = self._share[kind]
             for offset in offsets:
                 source = offset.pairs(kind)
                 row = self.neighbours.parent[source] + offset.shift
@@ -190,10 +190,9 @@ class NearRows:
 
     def at(self, parent: Ints, child: Ints) -> Floats:
         """Some entries of it, (N,), without the others."""
-        near, kinds = self.neighbours, (_LANDING, _MOVING)
+        near = self.neighbours
         found = np.zeros(parent.size)
-        share = self.weights[:, None] / (self._said.sum(axis=1) + _IMAGINARY)
-        for kind, offset in product(kinds, near.offsets):
+        for kind, offset in product((_LANDING, _MOVING), near.offsets):
             # Whose children would say it from there: a pair that speaks elsewhere is not told here.
             speaker = parent - offset.shift
             column = child
@@ -204,7 +203,7 @@ class NearRows:
             there = np.flatnonzero(pair >= 0)
             there = there[offset.pairs(kind)[pair[there]]]
             births = self.births[kind, pair[there]]
-            found[there] += offset.weight * births * share[kind, parent[there]]
+            found[there] += offset.weight * births * self._share[kind, parent[there]]
         return found
 
     def sample(self, rows: Ints, rng: np.random.Generator) -> Ints:
@@ -241,10 +240,15 @@ class NearRows:
         return np.stack([self.neighbours.said(kind, births) for kind, births in enumerate(self.births)])
 
     @cached_property
+    def _share(self) -> Floats:
+        """The part of each row that a birth it hears of is, by kind, (2, S)."""
+        share: Floats = self.weights[:, None] / (self._said.sum(axis=1) + _IMAGINARY)
+        return share
+
+    @cached_property
     def _through(self) -> Floats:
         """The part of each row that comes through each kind and offset, (2, K, S)."""
-        share = self.weights[:, None] / (self._said.sum(axis=1) + _IMAGINARY)
-        through: Floats = self._said * share[:, None, :]
+        through: Floats = self._said * self._share[:, None, :]
         return through
 
 

@@ -17,6 +17,7 @@ from scipy import sparse
 from nichechain.chain.lineages import urns_of
 from nichechain.core.intervals import drawn_interval, no_interval
 from nichechain.core.randomness import Purpose, keyed
+from nichechain.core.row_sampler import RowSampler
 from nichechain.evolvability.record import draw_known
 from nichechain.execution.side_by_side import side_by_side
 
@@ -183,11 +184,7 @@ def _first_generation(
     lineages = roots.shape[1]
     first = urns.walks(roots, 1, rng, roots=True)[:, lineages:]
     root, lineage = np.nonzero(rng.random(roots.shape) < known[:, None])
-    upto = np.concatenate([[0.0], np.cumsum(shares.data)])
-    begin, end = shares.indptr[root], shares.indptr[root + 1]
-    wanted = upto[begin] + rng.random(root.size) * (upto[end] - upto[begin])
-    place = np.searchsorted(upto, wanted, "right") - 1
-    first[root, lineage] = shares.indices[np.clip(place, begin, end - 1)]
+    first[root, lineage] = RowSampler(shares).draw(root, rng)
     return first
 
 
