@@ -12,6 +12,7 @@ import pyarrow as pa
 from nichechain.archive import read, write
 from nichechain.archive.log_columns import Columns, LogReader
 from nichechain.archive.logs import read_log
+from nichechain.core.checks import shown
 from nichechain.core.errors import ArchiveError, NichechainError
 from nichechain.core.files import writing
 from nichechain.niches import Niches
@@ -73,6 +74,8 @@ def import_births(
     ArchiveError
         If the folder holds an archive that must stay.
     """
+    if columns is not None and not isinstance(columns, Columns):
+        raise NichechainError(f"columns is {shown(columns)}, but must be Columns(...)")
     columns, axes = columns or Columns(), axes or Axes()
     table, source = read_log(log)
     name = source["file"] if hasattr(log, "columns") else log

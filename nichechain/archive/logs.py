@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import pyarrow as pa
 
+from nichechain.core.checks import shown
 from nichechain.core.errors import NichechainError
 from nichechain.core.parquet import read_parquet
 
@@ -65,13 +66,18 @@ def read_log(log: str | Path | pd.DataFrame | pa.Table) -> tuple[pa.Table, dict[
 
 def _read(path: Path) -> tuple[pa.Table, str]:
     """Rows of a file, and the checksum of its bytes."""
+    kind = "".join(path.suffixes[-2:]).lower() if path.suffix.lower() == ".gz" else path.suffix.lower()
     try:
+        # What is no log may have no end, such as a device, and is not read.
+        if path.exists() and kind not in (".csv", ".csv.gz", ".parquet"):
+            raise NichechainError(f"log {path} is neither a {_KINDS}, which are what can be imported")
         content = path.read_bytes()
     except OSError as error:
         raise NichechainError(f"{path} cannot be read: {error.strerror}") from error
-    kind = "".join(path.suffixes[-2:]).lower() if path.suffix.lower() == ".gz" else path.suffix.lower()
-    if kind not in (".csv", ".csv.gz", ".parquet"):
-        raise NichechainError(f"{path} is neither a {_KINDS}, which are what can be imported")
+    except ValueError as error:
+        if isinstance(error, NichechainError):
+            raise
+        raise NichechainError(f"log is {shown(str(path))}, but must be a file: {error}") from error
     digest = hashlib.sha256(content).hexdigest()
     try:
         if kind == ".parquet":

@@ -13,6 +13,7 @@ import pyarrow.compute as pc
 
 from nichechain.archive import read, write
 from nichechain.births.table import NONE
+from nichechain.core.checks import as_tuple, shown
 from nichechain.core.errors import ArchiveError, NichechainError
 from nichechain.core.files import writing
 from nichechain.niches import Niches
@@ -69,6 +70,9 @@ def merge(folders: Sequence[str | Path], out: str | Path) -> None:
     births and the uid of its first: the uid that a birth had in its own run is what lies above. Of a
     run that was calibrated it tells which births that added, by their uids in the run.
     """
+    for folder in as_tuple("folders", folders):
+        if not isinstance(folder, (str, Path)):
+            raise NichechainError(f"folders have {shown(folder)}, but must be folders of archives")
     paths, out = [Path(folder) for folder in folders], Path(out)
     if len(paths) < 2:
         raise NichechainError(f"{len(paths)} archive cannot be merged: give at least two")

@@ -6,6 +6,7 @@ import os
 from pathlib import Path
 from typing import Any
 
+from nichechain.core.checks import shown
 from nichechain.core.errors import ArchiveError
 from nichechain.search.config import BuildConfig
 
@@ -55,7 +56,7 @@ def check_origin(origin: dict[str, Any]) -> None:
         If something is missing, or of another kind.
     """
     if origin["kind"] not in ("merged", "imported"):
-        raise ValueError(f"it is {origin['kind']!r}, which this version cannot read")
+        raise ValueError(f"it is {shown(origin['kind'])}, which this version cannot read")
     if origin["kind"] == "merged":
         for run in origin["runs"]:
             BuildConfig.from_json(run["config"])

@@ -155,7 +155,8 @@ class TransitionCounts:
         NichechainError
             If a trajectory is no sequence of states that exist.
         """
-        if not isinstance(trajectories, Iterable) or getattr(trajectories, "ndim", 1) == 0:
+        one_by_one = isinstance(trajectories, Iterable) and not sparse.issparse(trajectories)
+        if not one_by_one or getattr(trajectories, "ndim", 1) == 0:
             raise NichechainError(f"trajectories is {shown(trajectories)}, but must be sequences of states")
         lineages = [as_whole("trajectories", each) for each in trajectories]
         for lineage in lineages:

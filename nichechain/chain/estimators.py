@@ -16,7 +16,7 @@ from nichechain.chain.model import NicheChain, Transition
 from nichechain.chain.operator import PooledTransition
 from nichechain.chain.posterior import DirichletPosterior
 from nichechain.chain.prior import fit_prior
-from nichechain.core.checks import check_choice, check_positive
+from nichechain.core.checks import check_choice, check_positive, shown
 from nichechain.core.errors import NichechainError
 
 Floats = NDArray[np.float64]
@@ -83,7 +83,7 @@ def estimate(
     if estimator == "dirichlet":
         return _dirichlet(counts, "1/n" if strength is None else strength)
     if isinstance(strength, str):
-        raise NichechainError(f"strength is {strength!r}, but must be a number for empirical-bayes")
+        raise NichechainError(f"strength is {shown(strength)}, but must be a number for empirical-bayes")
     return _empirical_bayes(counts, strength)
 
 
@@ -138,7 +138,9 @@ def _dirichlet(counts: TransitionCounts, strength: float | str) -> NicheChain:
     states = counts.niches.states
     if isinstance(strength, str):
         if strength not in ("jeffreys", "1/n"):
-            raise NichechainError(f"strength is {strength!r}, but must be a positive number, jeffreys or 1/n")
+            raise NichechainError(
+                f"strength is {shown(strength)}, but must be a positive number, jeffreys or 1/n"
+            )
         # Half a birth, or an n-th of one, in every state.
         size = states / 2.0 if strength == "jeffreys" else 1.0
     else:

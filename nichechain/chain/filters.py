@@ -8,6 +8,7 @@ import pyarrow.compute as pc
 
 from nichechain.births.table import LINEAGE, check_columns
 from nichechain.chain.counts import TransitionCounts
+from nichechain.core.checks import as_tuple, check_whole, shown
 from nichechain.core.errors import NichechainError
 from nichechain.niches import Niches
 
@@ -76,9 +77,10 @@ def within_steps(births: pa.Table, steps: tuple[int, int]) -> pa.Table:
     NichechainError
         If the window is empty, or births do not say their step.
     """
-    if len(steps) != 2 or not all(isinstance(step, (int, np.integer)) for step in steps):
-        raise NichechainError(f"steps are {steps!r}, but must be a window such as (0, 100)")
-    first, end = steps
+    numbers = as_tuple("steps", steps)
+    if len(numbers) != 2 or not all(isinstance(step, (int, np.integer)) for step in numbers):
+        raise NichechainError(f"steps are {shown(steps)}, but must be a window such as (0, 100)")
+    first, end = numbers
     if not 0 <= first < end:
         raise NichechainError(f"steps are {first} to {end}, but must be a window such as (0, 100)")
     step = _said(births, "step", "their step")
@@ -86,6 +88,7 @@ def within_steps(births: pa.Table, steps: tuple[int, int]) -> pa.Table:
 
 
 def _run(births: pa.Table, run: int) -> int:
+    check_whole(run=run)
     known = pc.unique(births["run"]).to_pylist()
     if run not in known:
         raise NichechainError(

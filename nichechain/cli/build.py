@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar
 import tyro
 
 from nichechain.cli import output, parsing, progress
-from nichechain.core.checks import DomainOption, StepBound
+from nichechain.core.checks import DomainOption, StepBound, shown
 from nichechain.core.errors import NichechainError
 from nichechain.search.config import MOST_FAILED, BuildConfig, ObjectiveName, SearchConfig
 
@@ -175,11 +175,11 @@ class BuildCommand(SearchConfig):
         axes = len(domain.behavior_names)
         if self.niches is None and len(config.shape) != axes:
             raise NichechainError(
-                f"--grid is {self.grid or _GRID!r}, but {self.domain} has {axes} axes of behavior"
+                f"--grid is {shown(self.grid or _GRID)}, but {self.domain} has {axes} axes of behavior"
             )
         if len(config.bounds) != axes:
             raise NichechainError(
-                f"--bounds is {self.bounds!r}, but {self.domain} needs {axes} pairs of numbers"
+                f"--bounds is {shown(self.bounds)}, but {self.domain} needs {axes} pairs of numbers"
             )
         check_niches(config)
         make_mutation(config, domain)

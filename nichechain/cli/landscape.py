@@ -170,11 +170,12 @@ def _results(
 
     chain = archive.chain()
     question = Question(command.l, command.lineages, seed=command.seed)
+    inside = found.state < len(archive.niches)
+    asked = np.unique(found.state[inside]) if inside.any() else None
     with progress.adding(question.number_of_samples(chain), "draws of T") as tell:
-        scores = answer_for_niches(chain, question, on_done=tell)
+        scores = answer_for_niches(chain, question, roots=asked, on_done=tell)
     assert scores.births is not None
     compared = np.where(scores.births >= command.min_births, scores.value, np.nan)
-    inside = found.state < len(archive.niches)
     births, value = np.full(len(found), np.nan), np.full(len(found), np.nan)
     births[inside], value[inside] = scores.births[found.state[inside]], compared[found.state[inside]]
     frame = found.frame()

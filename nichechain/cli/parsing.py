@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias, TypeVar
 import tyro
 
 from nichechain.cli import described, refusals
+from nichechain.core.checks import shown
 from nichechain.core.errors import NichechainError
 
 if TYPE_CHECKING:
@@ -155,13 +156,13 @@ def seeds(text: str) -> list[int]:
     for part in text.split(","):
         match = re.fullmatch(r"(\d{1,18})(?:\.\.(\d{1,18}))?", part.strip())
         if match is None:
-            raise NichechainError(f"--seeds is {text!r}, but must be seeds such as 0..9 or 0,3,5")
+            raise NichechainError(f"--seeds is {shown(text)}, but must be seeds such as 0..9 or 0,3,5")
         first, last = int(match[1]), int(match[2] or match[1])
         if last - first >= _MOST_SEEDS:
-            raise NichechainError(f"--seeds is {text!r}, but must be at most {_MOST_SEEDS} seeds")
+            raise NichechainError(f"--seeds is {shown(text)}, but must be at most {_MOST_SEEDS} seeds")
         found += range(first, last + 1)
     if not found or len(set(found)) < len(found):
-        raise NichechainError(f"--seeds is {text!r}, but must be seeds such as 0..9 or 0,3,5, each once")
+        raise NichechainError(f"--seeds is {shown(text)}, but must be seeds such as 0..9 or 0,3,5, each once")
     return found
 
 
@@ -180,10 +181,10 @@ def seen(archive: Archive, steps: str | None) -> Archive:
     last = 2**31 - 1
     window = (min(int(match[1] or 0), last), min(int(match[2] or last), last)) if match else (0, 0)
     if window[0] >= window[1]:
-        raise NichechainError(f"--steps is {steps!r}, but must be a window FROM:TO, such as 0:100")
+        raise NichechainError(f"--steps is {shown(steps)}, but must be a window FROM:TO, such as 0:100")
     found = archive.during(window)
     if not found.counts.births.sum():
-        raise NichechainError(f"--steps is {steps!r}, but must be a window with births of parents in it")
+        raise NichechainError(f"--steps is {shown(steps)}, but must be a window with births of parents in it")
     return found
 
 

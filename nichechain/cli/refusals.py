@@ -10,6 +10,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+from nichechain.core.checks import shown
 from nichechain.core.errors import NichechainError
 from nichechain.core.suggestions import did_you_mean
 
@@ -98,10 +99,11 @@ def _reworded(text: str, said: list[str], rest: list[str]) -> str:
         if choices:
             return _not_one_of(match["name"], match["value"], choices)
         allowed = " or ".join(_KINDS.get(kind, kind) for kind in kinds)
-        return f"{match['name']} is {match['value']!r}, but must be {allowed}"
+        return f"{match['name']} is {shown(match['value'])}, but must be {allowed}"
     if match := _WORD.search(text):
         allowed = "a whole number" if "int" in match["why"] else "a number"
-        return f"{match['name']} is {match['value']}, but must be {allowed}"
+        value = shown(match["value"].strip("'"))
+        return f"{match['name']} is {value}, but must be {allowed}"
     if match := _MISSING.search(text):
         return f"{match['name']} needs a value"
     if text.startswith("Unrecognized options: "):
@@ -116,4 +118,4 @@ def _reworded(text: str, said: list[str], rest: list[str]) -> str:
 
 
 def _not_one_of(name: str, value: str, known: list[str]) -> str:
-    return f"{name} is {value!r}, but must be one of {', '.join(known)}{did_you_mean(value, known)}"
+    return f"{name} is {shown(value)}, but must be one of {', '.join(known)}{did_you_mean(value, known)}"

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from nichechain.cli import output, parsing, progress
-from nichechain.core.checks import check_at_least
+from nichechain.core.checks import check_at_least, shown
 from nichechain.core.errors import NichechainError
 
 if TYPE_CHECKING:
@@ -124,7 +124,7 @@ def parse_sizes(text: str) -> list[int | tuple[int, ...]]:
             cells = ()
         if not cells or min(cells) < 1:
             raise NichechainError(
-                f"--sizes is {text!r}, but must be cells along every axis such as 5,10,20, "
+                f"--sizes is {shown(text)}, but must be cells along every axis such as 5,10,20, "
                 "or along each such as 10x20,20x40"
             )
         sizes.append(cells[0] if len(cells) == 1 else cells)
@@ -135,7 +135,7 @@ def _numbers(text: str) -> list[float]:
     try:
         return [float(part) for part in text.split(",")]
     except ValueError:
-        raise NichechainError(f"--behavior is {text!r}, but must be numbers such as 1.3,0.7") from None
+        raise NichechainError(f"--behavior is {shown(text)}, but must be numbers such as 1.3,0.7") from None
 
 
 def _check(command: SweepCommand) -> None:

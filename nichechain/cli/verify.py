@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 from nichechain.cli import output, parsing, progress
+from nichechain.core.checks import shown
 from nichechain.core.errors import NichechainError
 
 if TYPE_CHECKING:
@@ -77,7 +78,7 @@ def _sample(text: str) -> int | None:
     if text == "all":
         return None
     if not (text.isdecimal() and text.isascii()):
-        raise NichechainError(f"--sample is {text!r}, but must be a number of elites, from 0, or all")
+        raise NichechainError(f"--sample is {shown(text)}, but must be a number of elites, from 0, or all")
     return int(text)
 
 

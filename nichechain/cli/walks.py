@@ -12,6 +12,7 @@ import tyro
 
 from nichechain.cli import output, parsing, progress
 from nichechain.cli.begun import ReportCommand, ResumeCommand, stopped
+from nichechain.core.checks import shown
 from nichechain.core.errors import NichechainError
 from nichechain.studies.settings import MetricName, WalkSettings
 
@@ -340,7 +341,9 @@ def _study(
     shape = parse_shape(command.grid, "--grid")
     axes = len(domain.behavior_names)
     if len(shape) != axes:
-        raise NichechainError(f"--grid is {command.grid!r}, but {command.domain} has {axes} axes of behavior")
+        raise NichechainError(
+            f"--grid is {shown(command.grid)}, but {command.domain} has {axes} axes of behavior"
+        )
     return Study(
         kind=kind,
         domain=command.domain,

@@ -6,12 +6,13 @@ import math
 import operator
 from collections.abc import Iterable, Mapping
 from numbers import Integral, Rational, Real
-from typing import TYPE_CHECKING, Literal, TypeAlias
+from typing import TYPE_CHECKING, Literal, TypeAlias, TypeVar
 
 from nichechain.core.errors import NichechainError
 
 DomainOption: TypeAlias = str | int | float | bool
 """What a domain can be told besides its seed."""
+Part = TypeVar("Part")
 StepBound = Literal["per-coordinate", "rescaled"]
 """How steps of mutation may be bounded."""
 EPSILON = 1e-6
@@ -24,6 +25,9 @@ if TYPE_CHECKING:
 
 
 _MOST_SHOWN = 80
+
+# 256 GiB of them: what is beyond is a mistyped number.
+_MOST_GENES = 2**36
 
 
 def shown(value: object) -> str:
@@ -96,6 +100,21 @@ def check_at_least(least: int, **values: object) -> None:
             raise NichechainError(f"{name} is {value}, but must {allowed}")
 
 
+def check_sample(n: int, length: int) -> int:
+    """How many genotypes of some length are asked for, as a plain number.
+
+    Raises
+    ------
+    NichechainError
+        If it is no whole number, negative, or more than any memory holds.
+    """
+    check_at_least(0, n=n)
+    most = _MOST_GENES // max(1, length)
+    if n > most:
+        raise NichechainError(f"n is {n}, but must be at most {most} genotypes of {length} genes")
+    return int(n)
+
+
 def check_lineages(offspring: int, **values: object) -> None:
     """Refuse more lineages than there are offspring to begin them.
 
@@ -159,6 +178,33 @@ def check_choice(name: str, value: object, allowed: Iterable[str]) -> None:
     words = tuple(allowed)
     if not isinstance(value, str) or value not in words:
         raise NichechainError(f"{name} is {shown(value)}, but must be one of {', '.join(words)}")
+
+
+def check_text(**values: object) -> None:
+    """Refuse what is no text.
+
+    Raises
+    ------
+    NichechainError
+        If a value is of another type.
+    """
+    for name, value in values.items():
+        if not isinstance(value, str):
+            raise NichechainError(f"{name} is {shown(value)}, but must be a text")
+
+
+def as_tuple(name: str, values: Iterable[Part]) -> tuple[Part, ...]:
+    """What a parameter lists, one by one; what is in it is the caller's to check.
+
+    Raises
+    ------
+    NichechainError
+        If it is no list of anything.
+    """
+    try:
+        return tuple(values)
+    except TypeError:
+        raise NichechainError(f"{name} is {shown(values)}, but must be a sequence") from None
 
 
 def check_seed(seed: object) -> None:
@@ -249,7 +295,9 @@ def as_shape(shape: object) -> tuple[int, ...]:
     try:
         return tuple(operator.index(cells) for cells in shape)  # type: ignore[attr-defined]
     except TypeError:
-        raise NichechainError(f"shape is {shape!r}, but must be whole numbers such as (20, 20)") from None
+        raise NichechainError(
+            f"shape is {shown(shape)}, but must be whole numbers such as (20, 20)"
+        ) from None
 
 
 def as_bounds(bounds: object) -> tuple[tuple[float, float], ...]:
@@ -264,18 +312,20 @@ def as_bounds(bounds: object) -> tuple[tuple[float, float], ...]:
         return tuple((float(low), float(high)) for low, high in bounds)  # type: ignore[attr-defined]
     except (TypeError, ValueError):
         raise NichechainError(
-            f"bounds are {bounds!r}, but must be a pair of numbers for each axis, such as ((0, 1), (0, 1))"
+            f"bounds are {shown(bounds)}, "
+            "but must be a pair of numbers for each axis, such as ((0, 1), (0, 1))"
         ) from None
 
 
 def plain_options(options: Mapping[str, DomainOption]) -> dict[str, DomainOption]:
     """Options in the order of their names, so that equal ones are written alike."""
     if not isinstance(options, Mapping):
-        raise NichechainError(f"domain_options is {options!r}, but must map names to values")
+        raise NichechainError(f"domain_options is {shown(options)}, but must map names to values")
     for name, value in options.items():
         fits = isinstance(value, (str, int)) or (isinstance(value, float) and math.isfinite(value))
         if not isinstance(name, str) or not fits:
             raise NichechainError(
-                f"domain option {name!r} is {value!r}, but must be a text, a finite number, or true or false"
+                f"domain option {name!r} is {shown(value)}, "
+                "but must be a text, a finite number, or true or false"
             )
     return {name: options[name] for name in sorted(options)}

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from nichechain.core.checks import check_at_least, check_seed, rng_of
+from nichechain.core.checks import check_at_least, check_sample, check_seed, rng_of
 from nichechain.domains.base import Evaluation, check_genotypes
 from nichechain.domains.noise import Noise, check_seeds
 from nichechain.domains.shown import ShownDomain
@@ -65,7 +65,7 @@ class PlanarArm(ShownDomain):
 
     def sample(self, n: int, *, seed: int | np.random.Generator) -> NDArray[np.float32]:
         """Angles uniform in [-0.1, 0.1] radians, (n, joints): a nearly stretched arm."""
-        check_at_least(0, n=n)
+        n = check_sample(n, self.genotype_length)
         rng = rng_of(seed)
         return rng.uniform(-0.1, 0.1, (n, self.genotype_length)).astype(np.float32)
 

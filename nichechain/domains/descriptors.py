@@ -13,6 +13,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from nichechain.core.checks import shown
 from nichechain.core.errors import NichechainError
 from nichechain.niches.base import precision_of
 
@@ -198,7 +199,7 @@ def named(text: str) -> tuple[Descriptor, tuple[str, ...] | None]:
     if all(part.isidentifier() for part in (*module.split("."), *function.split("."))):
         return Imported(text), None
     raise NichechainError(
-        f"descriptor is {text!r}, but must be final-xy, final-observation:I,J, mean-observation:I,J, "
+        f"descriptor is {shown(text)}, but must be final-xy, final-observation:I,J, mean-observation:I,J, "
         "final-info:KEY,KEY or MODULE:FUNCTION"
     )
 

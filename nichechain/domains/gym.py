@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from nichechain.core.checks import as_bounds, check_at_least, check_seed
+from nichechain.core.checks import as_bounds, as_tuple, check_at_least, check_seed, check_text, shown
 from nichechain.core.errors import NichechainError
 from nichechain.domains.base import Evaluation, check_genotypes
 from nichechain.domains.descriptors import Descriptor, Episode, FinalObservation, MeanObservation, named
@@ -113,8 +113,11 @@ class GymDomain(ShownDomain):
         evolve_biases: bool = False,
         env_options: Mapping[str, Any] | None = None,
     ) -> None:
+        check_text(environment=env_id)
         check_seed(seed)
         check_at_least(1, repeats=repeats)
+        if env_options is not None and not isinstance(env_options, Mapping):
+            raise NichechainError(f"env_options is {shown(env_options)}, but must map names to values")
         if steps is not None:
             check_at_least(1, steps=steps)
         self.env_id = env_id
@@ -144,7 +147,9 @@ class GymDomain(ShownDomain):
         self._descriptor: Descriptor = descriptor
         self.bounds = self._bounds(bounds)
         axes = len(self.bounds)
-        self.behavior_names = tuple(names or known or map(str, range(axes)))
+        named_axes = None if names is None else as_tuple("names", names)
+        check_text(**{f"names of axis {axis}": name for axis, name in enumerate(named_axes or ())})
+        self.behavior_names = tuple(named_axes or known or map(str, range(axes)))
         if len(self.behavior_names) != axes:
             raise NichechainError(
                 f"there are bounds of {axes} axes of behavior, but {len(self.behavior_names)} axes: "

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from typing import Any
 
-from nichechain.core.checks import check_whole
+from nichechain.core.checks import check_whole, shown
 from nichechain.core.errors import NichechainError
 from nichechain.domains.base import Wrapper
 
@@ -39,7 +39,7 @@ def parse_memory(text: str) -> int:
     found = re.fullmatch(r"([0-9]+(?:\.[0-9]+)?)\s*([A-Za-z]*)", text.strip(), re.ASCII)
     if found is None or found[2].upper() not in _UNITS:
         raise NichechainError(
-            f"cache_memory is {text!r}, but must be such as 2GiB or 500MB, or 0 for no cache"
+            f"cache_memory is {shown(text)}, but must be such as 2GiB or 500MB, or 0 for no cache"
         )
     return int(float(found[1]) * _UNITS[found[2].upper()])
 

@@ -15,7 +15,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from nichechain.core.checks import check_at_least, check_numbers, check_positive
+from nichechain.core.checks import as_tuple, check_at_least, check_numbers, check_positive, check_text, shown
 from nichechain.core.errors import NichechainError
 from nichechain.domains.base import Domain, Evaluation, Wrapper, check_genotypes
 
@@ -62,6 +62,7 @@ class Noise:
         NichechainError
             If it is not of this form.
         """
+        check_text(noise=text)
         names = [field.name for field in fields(cls)]
         values: dict[str, float] = {}
         for part in text.split(","):
@@ -72,7 +73,8 @@ class Noise:
                 name = ""
             if name not in names:
                 raise NichechainError(
-                    f"noise is {text!r}, but must be like action:0.1,initial:0.02 with {', '.join(names)}"
+                    f"noise is {shown(text)}, "
+                    f"but must be like action:0.1,initial:0.02 with {', '.join(names)}"
                 )
         return cls(**values)
 
@@ -305,6 +307,9 @@ class WithSensitivity(Wrapper):
         super().__init__(domain)
         if getattr(domain, "repeats", 1) < 2:
             raise NichechainError(f"sensitivity needs two repeats or more, but {domain!r} makes one")
+        axes = as_tuple("axes", axes)
+        for axis in axes:
+            check_text(**{"one of axes": axis})
         known = (*domain.behavior_names, self.SENSITIVITY)
         if self.SENSITIVITY not in axes or len(set(axes)) < len(axes) or not set(axes) <= set(known):
             raise NichechainError(

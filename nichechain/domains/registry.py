@@ -11,7 +11,7 @@ from collections.abc import Callable
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any
 
-from nichechain.core.checks import DomainOption
+from nichechain.core.checks import DomainOption, check_text, shown
 from nichechain.core.errors import NichechainError
 from nichechain.domains.arm import PlanarArm
 from nichechain.domains.base import Domain
@@ -104,6 +104,7 @@ def _entry_points() -> dict[str, EntryPoint]:
 
 
 def _factory(name: str) -> Callable[..., Domain]:
+    check_text(domain=name)
     if name in _BUILT_IN:
         return _BUILT_IN[name]
     if name.startswith(PREFIX):
@@ -112,7 +113,7 @@ def _factory(name: str) -> Callable[..., Domain]:
     points = _entry_points()
     if name not in points:
         raise NichechainError(
-            f"domain is {name!r}, but must be one of {', '.join(names())}, or {PREFIX}ENV_ID"
+            f"domain is {shown(name)}, but must be one of {', '.join(names())}, or {PREFIX}ENV_ID"
         )
     try:
         factory: Callable[..., Domain] = points[name].load()

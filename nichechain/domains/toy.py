@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from nichechain.core.checks import check_at_least, check_seed, rng_of
+from nichechain.core.checks import check_sample, check_seed, rng_of
 from nichechain.domains.base import Evaluation, check_genotypes
 from nichechain.domains.noise import Noise, check_seeds
 from nichechain.domains.shown import ShownDomain
@@ -60,7 +60,7 @@ class ToyMap(ShownDomain):
 
     def sample(self, n: int, *, seed: int | np.random.Generator) -> NDArray[np.float32]:
         """Genomes uniform in [-0.5, 0.5]², as in the study, (n, 2)."""
-        check_at_least(0, n=n)
+        n = check_sample(n, 2)
         return rng_of(seed).uniform(-0.5, 0.5, (n, 2)).astype(np.float32)
 
     def evaluate(self, genotypes: ArrayLike) -> Evaluation:

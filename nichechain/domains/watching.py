@@ -17,6 +17,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from nichechain.core.checks import as_floats
 from nichechain.core.errors import NichechainError
 from nichechain.domains.base import Domain, Wrapper
 
@@ -106,7 +107,7 @@ def watch(domain: Domain, genotype: ArrayLike, *, drawn: bool = False) -> Film |
             f"{domain.name} cannot be watched: its domain has no method watch, "
             "see nichechain.domains.watching.Watchable"
         )
-    row = np.asarray(genotype)
+    row = as_floats("genotype", genotype)
     if row.shape != (domain.genotype_length,):
         raise NichechainError(f"genotype has shape {row.shape}, but must be ({domain.genotype_length},)")
     if not np.isfinite(row).all():

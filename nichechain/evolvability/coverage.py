@@ -21,6 +21,9 @@ Ints = NDArray[np.int64]
 # Cells of the table (repeats, niches) and walks in flight that a simulation keeps at once.
 _CELLS = 8_000_000
 
+# Lineages that are simulated at once, and numbers of an answer: more would take many GiB.
+_MOST_WALKS, _MOST_KEPT = 10**8, 2**27
+
 # Target niches treated together.
 _COLUMNS = 128
 
@@ -180,7 +183,10 @@ def coverage_by_generation(
     counted = _counted(counted, size)
     sizes = _sizes(lineages)
     check_at_least(1, longest=longest)
-    transition = _faster(transition)
+    most = _MOST_KEPT // max(1, states.size * sizes.size)
+    if longest > most:
+        raise NichechainError(f"longest is {longest}, but must be at most {most}: every length is kept")
+    transition, longest = _faster(transition), int(longest)
     found = np.zeros((states.size, longest, sizes.size))
     for start in range(0, counted, _COLUMNS):
         targets = np.arange(start, min(start + _COLUMNS, counted))
@@ -281,6 +287,9 @@ def simulated_lineages(
     iterator of (N,) int64 arrays
         Their states, step after step: to be exhausted before the next repeats are asked for.
     """
+    if lineages > _MOST_WALKS:
+        raise NichechainError(f"lineages is {lineages}, but must be at most {_MOST_WALKS} to be simulated")
+    steps, lineages, repeats = int(steps), int(lineages), int(repeats)
     onward, begin = RowSampler(entries(transition)), RowSampler(first[None, :])
     at_once = max(1, cells // max(transition.shape[0], lineages))
     for done in range(0, repeats, at_once):

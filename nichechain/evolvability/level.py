@@ -22,8 +22,8 @@ from nichechain.evolvability.urns import covered
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-# Niches that stand for all of a large chain.
-_MOST_ROOTS = 200
+MOST_ROOTS = 200
+"""Niches that stand for all of a large chain."""
 
 
 def level(posterior: DirichletPosterior, roots: Ints, question: Question, sizes: list[int]) -> Floats:
@@ -46,7 +46,7 @@ def level(posterior: DirichletPosterior, roots: Ints, question: Question, sizes:
     """
     chain = with_posterior(posterior.counts, posterior, "a draw")
     if question.by_urns(chain):
-        few = np.unique(np.linspace(0, roots.size - 1, min(roots.size, _MOST_ROOTS)).astype(np.int64))
+        few = np.unique(np.linspace(0, roots.size - 1, min(roots.size, MOST_ROOTS)).astype(np.int64))
         lineages = max(2, *sizes)
         urns = urns_of(posterior, keyed(question.seed, Purpose.POSTERIOR, 0))
         rng = keyed(question.seed, Purpose.WALKS, 0)

@@ -131,6 +131,9 @@ class Question:
         check_choice("convention", self.convention, get_args(Convention))
         check_choice("method", self.method, get_args(Method))
         check_seed(self.seed)
+        for name in ("l", "lineages", "repeats", "draws", "seed"):
+            # Short numbers of NumPy would overflow in what is computed with them.
+            object.__setattr__(self, name, int(getattr(self, name)))
 
     @property
     def root_counts(self) -> bool:
@@ -151,7 +154,7 @@ class Question:
         small = chain.states <= MOST_EXACT or self.l > _LONGEST or self.lineages > _MOST_LINEAGES
         return self.method == "auto" and chain.posterior is not None and not small
 
-    def warn_if_long(self, chain: NicheChain, roots: int = 1) -> None:
+    def warn_if_long(self, chain: NicheChain, roots: int = 1, samples: int | None = None) -> None:
         """Say so before it begins where an answer could take over ten minutes.
 
         Parameters
@@ -159,8 +162,10 @@ class Question:
         chain : NicheChain
         roots : int
             Roots that are asked for.
+        samples : int, optional
+            Draws of T, where they are not those of the question.
         """
-        samples = self.number_of_samples(chain)
+        samples = self.number_of_samples(chain) if samples is None else samples
         if self.method == "monte-carlo":
             moves = float(roots) * max(samples, self.repeats) * self.lineages * self.steps
             cost = moves / _MOVES_A_SECOND

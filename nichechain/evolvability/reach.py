@@ -24,6 +24,8 @@ Floats = NDArray[np.float64]
 
 # Share of possible transitions from which on walks of a few steps see most states.
 _DENSE = 0.05
+# Longer walks are not kept step by step, and end where no probability changes by more than rounding.
+_LONGEST, _SETTLED, _NOTHING = 1_000, 1e-14, 1e-13
 
 MOST_POWERS = 12
 """Steps up to which returns in a matrix that is not sparse are those of its powers."""
@@ -184,8 +186,12 @@ def visit_probability(transition: Transition, first: Floats, steps: int) -> tupl
     and r_m that of a return after m steps. Only the returns need walks of their own: from the
     states that are reached, and only for as many steps as are left by then. In a matrix that is
     not sparse they soon see all others. Returns of few steps are there diagonals of T^m, products of two
-    powers half as high; for more steps the recursion over all roots is faster.
+    powers half as high; for more steps the recursion over all roots is faster. Longer walks than a thousand
+    states are followed by that recursion too, and no further than where nothing changes any more.
     """
+    if steps > _LONGEST:
+        blocks = [h for _, h in visit_probabilities(transition, first[None, :], steps)]
+        return np.minimum(np.hstack(blocks)[0], 1.0), _expected_visits(transition, first, steps)
     rows, dense = transition, True
     if not isinstance(transition, PooledTransition):
         dense = bool(np.count_nonzero(_entries(transition)) > _DENSE * first.size**2)
@@ -220,6 +226,22 @@ def visit_probability(transition: Transition, first: Floats, steps: int) -> tupl
             earlier = new[:k, again] * returns[k - 1 :: -1]
             new[k, again] = np.maximum(present[k, again] - earlier.sum(axis=0), 0.0)
     return np.clip(new.sum(axis=0), 0.0, 1.0), passes
+
+
+def _expected_visits(transition: Transition, first: Floats, steps: int) -> Floats:
+    """How often a walk of many steps is in each state in expectation, (S,)."""
+    passes: Floats = first.copy()
+    present = first
+    for left in range(steps - 1, 0, -1):
+        after = np.asarray(present @ transition)
+        # A state that the walk leaves for good never settles, but counts for nothing in the end.
+        still = (np.abs(after - present) <= _SETTLED * after) | (left * after <= _NOTHING)
+        if still.all():
+            passes += left * after
+            return passes
+        present = after
+        passes += after
+    return passes
 
 
 def _entries(transition: Floats | sparse.csr_array) -> Floats:

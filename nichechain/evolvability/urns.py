@@ -19,7 +19,7 @@ from nichechain.core.intervals import drawn_interval, no_interval
 from nichechain.core.randomness import Purpose, keyed
 from nichechain.core.row_sampler import RowSampler
 from nichechain.evolvability.record import draw_known
-from nichechain.execution.side_by_side import side_by_side
+from nichechain.execution.side_by_side import side_by_side, stop_if_nobody_waits
 
 if TYPE_CHECKING:
     from nichechain.chain.posterior import DirichletPosterior
@@ -158,6 +158,7 @@ def simulated_coverage(
         urns = urns_of(posterior, keyed(question.seed, Purpose.POSTERIOR, draw))
         own = None if record is None else record.draw(keyed(question.seed, Purpose.FIRST_GENERATION, draw))
         for start in range(0, m, at_once):
+            stop_if_nobody_waits()
             block = slice(start, min(start + at_once, m))
             if roots is None:
                 assert offspring is not None

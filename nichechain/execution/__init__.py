@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from contextlib import AbstractContextManager
 
+from nichechain.core.checks import shown
 from nichechain.core.errors import NichechainError
 from nichechain.domains.memory import parse_memory
 from nichechain.execution.base import WORKER_DIED, Executor, available_cpus, evaluate_rows
@@ -21,6 +22,10 @@ __all__ = [
     "evaluate_rows",
     "make",
 ]
+
+
+# More than any machine has processors: a mistyped number, for which as many processes would be started.
+_MOST_WORKERS = 4096
 
 
 def make(workers: str | None = None, cache_memory: str | None = None) -> AbstractContextManager[Executor]:
@@ -56,10 +61,14 @@ def make(workers: str | None = None, cache_memory: str | None = None) -> Abstrac
         return Ray(workers, cache_memory=limit)
     if kind in ("threads", "processes") and (workers in (None, kind) or _is_number(rest)):
         count = int(rest) if rest else None
+        if count is not None and count > _MOST_WORKERS:
+            raise NichechainError(
+                f"workers is {shown(workers)}, but must be at most {_MOST_WORKERS} on a machine"
+            )
         kind_of = Threads if kind == "threads" else Processes
         return kind_of(count, cache_memory=limit)
     raise NichechainError(
-        f"workers is {workers!r}, but must be a number of threads, threads:N, processes:N, ray or ray://HOST:PORT"
+        f"workers is {shown(workers)}, but must be a number of threads, threads:N, processes:N, ray or ray://HOST:PORT"
     )
 
 

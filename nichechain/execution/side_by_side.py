@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
+import threading
+from collections import deque
 from collections.abc import Callable, Iterable
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from typing import TypeVar
 
 from nichechain.execution.base import available_cpus
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
+
+# So many items for each thread wait for it, however many there are.
+_AHEAD = 4
+
+_under_way = threading.local()
 
 
 def side_by_side(
@@ -20,7 +27,8 @@ def side_by_side(
     Parameters
     ----------
     call : callable
-        Leaves the interpreter to others most of the time, as products of matrices do.
+        Leaves the interpreter to others most of the time, as products of matrices do. Where one item may
+        take long, it calls :func:`stop_if_nobody_waits` now and then.
     items : iterable
     on_done : callable, optional
         Told, in the thread that asks, how many more are done.
@@ -30,14 +38,43 @@ def side_by_side(
     list
         The same whatever the number of threads, if ``call`` depends on its item alone.
     """
-    pool = ThreadPoolExecutor(available_cpus())
+    threads = available_cpus()
+    over = threading.Event()
+    pool = ThreadPoolExecutor(threads, initializer=_belong, initargs=(over,))
+    results: list[Result] = []
+    waiting: deque[Future[Result]] = deque()
+
+    def take() -> None:
+        results.append(waiting.popleft().result())
+        if on_done is not None:
+            on_done(1)
+
     try:
-        results = []
-        for future in [pool.submit(call, item) for item in items]:
-            results.append(future.result())
-            if on_done is not None:
-                on_done(1)
+        for item in items:
+            waiting.append(pool.submit(call, item))
+            if len(waiting) > _AHEAD * threads:
+                take()
+        while waiting:
+            take()
         return results
     finally:
         # Whoever is interrupted waits for what is under way, and for no more.
+        over.set()
         pool.shutdown(cancel_futures=True)
+
+
+def stop_if_nobody_waits() -> None:
+    """End a computation of :func:`side_by_side` that was interrupted, from within; anywhere else nothing.
+
+    Raises
+    ------
+    InterruptedError
+        If whoever asked for it has gone.
+    """
+    over = getattr(_under_way, "over", None)
+    if over is not None and over.is_set():
+        raise InterruptedError("nobody waits for this computation any more")
+
+
+def _belong(over: threading.Event) -> None:
+    _under_way.over = over

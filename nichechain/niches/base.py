@@ -8,7 +8,7 @@ from typing import Any, ClassVar, Final, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from nichechain.core.checks import as_floats
+from nichechain.core.checks import as_floats, shown
 from nichechain.core.errors import NichechainError
 
 Floats = NDArray[np.float64]
@@ -126,7 +126,9 @@ class Niches(ABC):
         """
         if isinstance(niche, str):
             if niche != OUTSIDE:
-                raise NichechainError(f"niche is {niche!r}, but must be an index, a number, or {OUTSIDE!r}")
+                raise NichechainError(
+                    f"niche is {shown(niche)}, but must be an index, a number, or {OUTSIDE!r}"
+                )
             if self.outside == "clip":
                 raise NichechainError(
                     "niche is 'outside', but these niches have no outside state: it is clipped"
@@ -138,7 +140,8 @@ class Niches(ABC):
 
     def label(self, state: int) -> str:
         """How a state is called in tables and figures: its index, as ``"7,11"``, or ``"outside"``."""
-        return OUTSIDE if state == len(self) else ",".join(map(str, self.index(state)))
+        outside = isinstance(state, (int, np.integer)) and state == len(self)
+        return OUTSIDE if outside else ",".join(map(str, self.index(state)))
 
 
 MOST_NICHES = 10_000_000
@@ -146,7 +149,9 @@ MOST_NICHES = 10_000_000
 
 
 def check_bounds(bounds: Bounds) -> None:
-    """Refuse bounds that are not finite and increasing."""
+    """Refuse bounds that are none, or not finite and increasing."""
+    if not len(bounds):
+        raise NichechainError("bounds are empty, but must have a pair of numbers for each axis")
     for low, high in bounds:
         if not (np.isfinite(low) and np.isfinite(high) and low < high):
             raise NichechainError(f"bounds are {low:g} to {high:g}, but must be finite and increasing")
@@ -208,7 +213,9 @@ def one_hot(behavior: ArrayLike, niches: Niches) -> Floats:
     the probability that two offspring fall in different niches.
     """
     points = as_floats("behavior", behavior)
-    flat = points.reshape(-1, points.shape[-1]) if points.ndim else points
+    if not points.ndim or not points.shape[-1]:
+        raise NichechainError(f"behavior has shape {points.shape}, but must be (..., {len(niches.bounds)})")
+    flat = points.reshape(-1, points.shape[-1])
     known = ~np.isnan(flat).any(axis=-1)
     state = niches.of(flat[known])
     form = np.zeros((len(flat), len(niches)))

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from nichechain.core.checks import as_bounds, as_floats, check_choice, check_whole
+from nichechain.core.checks import as_bounds, as_floats, check_choice, check_whole, shown
 from nichechain.core.errors import NichechainError
 from nichechain.core.randomness import Purpose, keyed
 from nichechain.niches.base import (
@@ -111,7 +111,7 @@ class CVTNiches(Niches):
         check_whole(niches=number)
         if not 1 <= number <= MOST_NICHES:
             raise NichechainError(f"niches are {number}, but must be from 1 to {MOST_NICHES}")
-        bounds = as_bounds(bounds)
+        number, bounds = int(number), as_bounds(bounds)
         check_bounds(bounds)
         return cls(_lloyd(number, np.array(bounds, np.float64), seed), bounds, outside)
 
@@ -160,7 +160,7 @@ class CVTNiches(Niches):
             number = operator.index(given)  # type: ignore[arg-type]
         except TypeError:
             raise NichechainError(
-                f"niche is {niche!r}, but niches of a tessellation have one number each, such as 17"
+                f"niche is {shown(niche)}, but niches of a tessellation have one number each, such as 17"
             ) from None
         if not 0 <= number < len(self):
             raise NichechainError(f"niche is {number}, but there are niches 0 to {len(self) - 1}")

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from nichechain.core.checks import shown
 from nichechain.core.errors import NichechainError
 from nichechain.niches.base import Niches
 from nichechain.niches.cvt import CVTNiches
@@ -39,4 +40,4 @@ def from_plain(values: dict[str, Any]) -> Niches:
         centroids = np.frombuffer(bytes.fromhex(values["centroids"])).reshape(shape[0], len(bounds))
         return CVTNiches(centroids, bounds, outside)
     except (KeyError, TypeError, ValueError) as error:
-        raise NichechainError(f"values are {values!r}, which are of no niches") from error
+        raise NichechainError(f"values are {shown(values)}, which are of no niches") from error

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from nichechain.core.checks import shown
 from nichechain.core.errors import NichechainError
 from nichechain.niches.base import Niches
 from nichechain.niches.cvt import CVTNiches
@@ -61,4 +62,6 @@ def empty_archive(niches: Niches, **options: Any) -> Any:
         case CVTNiches():
             return CVTArchive(centroids=niches.centroids, ranges=niches.bounds, **options)
         case _:
-            raise NichechainError(f"niches are {niches!r}, but pyribs has an archive for grid and cvt only")
+            raise NichechainError(
+                f"niches are {shown(niches)}, but pyribs has an archive for grid and cvt only"
+            )

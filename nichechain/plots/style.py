@@ -38,6 +38,8 @@ _NOTE = 62
 
 # Height of a strip that shows one axis of behavior, over its width.
 _STRIP = 0.18
+# Where one axis is so many times as long as the other, a map to scale is a line.
+_MOST_UNEQUAL = 10.0
 # Distance of the legend from the map, in inches: ticks and the name of an axis stand between.
 _LEGEND = 0.42
 
@@ -53,7 +55,9 @@ def axes_of(ax: Axes | None) -> Axes:
 
 
 def behavior_axes(ax: Axes, archive: Archive, *, strip: bool = True) -> None:
-    """Label an Axes with the one or two axes of behavior, to scale, and mark the start.
+    """Label an Axes with the one or two axes of behavior and mark the start.
+
+    The axes are to scale, unless one is more than ten times as long as the other.
 
     Parameters
     ----------
@@ -76,7 +80,9 @@ def behavior_axes(ax: Axes, archive: Archive, *, strip: bool = True) -> None:
         )
     if len(names) == 2:
         (left, right), (bottom, top) = archive.niches.bounds
-        ax.set(xlim=(left, right), ylim=(bottom, top), aspect="equal", xlabel=names[0], ylabel=names[1])
+        sides = sorted((right - left, top - bottom))
+        aspect = "equal" if sides[1] <= _MOST_UNEQUAL * sides[0] else "auto"
+        ax.set(xlim=(left, right), ylim=(bottom, top), aspect=aspect, xlabel=names[0], ylabel=names[1])
         _name_niches(ax, archive)
     else:
         ax.set(xlim=archive.niches.bounds[0], ylim=(0.0, 1.0), yticks=[], xlabel=names[0])

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nichechain.births.table import NONE
-from nichechain.core.checks import as_whole
+from nichechain.core.checks import as_whole, shown
 from nichechain.core.errors import NichechainError
 from nichechain.niches import Niches
 from nichechain.niches.ribs import empty_archive, niches_of
@@ -43,7 +43,7 @@ def home_of(archive: Any, result_archive: Any, niches: Niches | None, outside: s
     if niches is not None:
         if not isinstance(niches, Niches):
             raise NichechainError(
-                f"niches are {niches!r}, but must be niches of nichechain, such as GridNiches(...)"
+                f"niches are {shown(niches)}, but must be niches of nichechain, such as GridNiches(...)"
             )
         if len(niches.bounds) != archive.measure_dim:
             raise NichechainError(

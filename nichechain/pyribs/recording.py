@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from nichechain.births.acceptance import one_by_one
 from nichechain.births.table import NONE
-from nichechain.core.checks import check_choice
+from nichechain.core.checks import check_choice, shown
 from nichechain.core.errors import NichechainError
 from nichechain.niches import Niches
 from nichechain.niches.base import is_inside, precision_of
@@ -200,7 +200,8 @@ class Recording:
         for name, value, own in zip(names, given, self._asked_for, strict=True):
             if value != own:
                 raise NichechainError(
-                    f"{name} is {value!r}, but the scheduler is being recorded already, with {own!r}, which "
+                    f"{name} is {shown(value)}, "
+                    f"but the scheduler is being recorded already, with {own!r}, which "
                     "must stay: stop() that recording first"
                 )
 

@@ -13,12 +13,15 @@ from nichechain.core.checks import (
     StepBound,
     as_bounds,
     as_shape,
+    as_tuple,
     check_at_least,
     check_choice,
     check_lineages,
     check_numbers,
     check_positive,
+    check_text,
     plain_options,
+    shown,
 )
 from nichechain.core.errors import NichechainError
 
@@ -41,6 +44,9 @@ WHO_IS_ELITE: dict[str, str] = {
 
 MOST_FAILED = 0.5
 """Share of births that may fail before a run is stopped, unless told otherwise."""
+
+# Children of a step are drawn and grown at once.
+_MOST_AT_ONCE = 2**24
 
 BROOD = 10
 """Lineages that begin at the same elite, unless told otherwise."""
@@ -201,7 +207,10 @@ class BuildConfig(SearchConfig):
 
     def __post_init__(self) -> None:
         if not isinstance(self.domain, str):
-            raise NichechainError(f"domain is {self.domain!r}, but must be the name of a domain")
+            raise NichechainError(f"domain is {shown(self.domain)}, but must be the name of a domain")
+        check_text(mutation=self.mutation, outside=self.outside)
+        if not isinstance(self.self_adaptive, bool):
+            raise NichechainError(f"self_adaptive is {shown(self.self_adaptive)}, but must be True or False")
         asked = [
             name
             for name in ("selection_l", "selection_lineages", "objective_lineages")
@@ -217,28 +226,36 @@ class BuildConfig(SearchConfig):
                 object.__setattr__(self, name, operator.index(getattr(self, name)))
             except TypeError:
                 raise NichechainError(
-                    f"{name} is {getattr(self, name)!r}, but must be a whole number"
+                    f"{name} is {shown(getattr(self, name))}, but must be a whole number"
                 ) from None
         object.__setattr__(self, "shape", as_shape(self.shape))
         object.__setattr__(self, "bounds", as_bounds(self.bounds))
         check_numbers(scale=self.scale)
         object.__setattr__(self, "scale", float(self.scale))
         object.__setattr__(self, "domain_options", plain_options(self.domain_options))
-        for scale in self.layer_scales:
+        scales = as_tuple("layer_scales", self.layer_scales)
+        for scale in scales:
             check_numbers(layer_scale=scale)
-        object.__setattr__(self, "layer_scales", tuple(float(scale) for scale in self.layer_scales))
+        object.__setattr__(self, "layer_scales", tuple(float(scale) for scale in scales))
         if self.df is not None:
             check_numbers(df=self.df)
             object.__setattr__(self, "df", float(self.df))
         if self.step_bound is not None:
-            if isinstance(self.step_bound, str) or len(self.step_bound) != 2:
+            if not isinstance(self.step_bound, (tuple, list)) or len(self.step_bound) != 2:
                 raise NichechainError(
-                    f"step_bound is {self.step_bound!r}, but must be a kind and a size, as ('rescaled', 2.0)"
+                    f"step_bound is {shown(self.step_bound)}, "
+                    "but must be a kind and a size, as ('rescaled', 2.0)"
                 )
             kind, size = self.step_bound
             check_numbers(step_bound=size)
             object.__setattr__(self, "step_bound", (kind, float(size)))
         check_at_least(1, evaluations=self.evaluations, initial=self.initial, batch=self.batch)
+        for name in ("initial", "batch"):
+            if getattr(self, name) > _MOST_AT_ONCE:
+                raise NichechainError(
+                    f"{name} is {getattr(self, name)}, but must be at most {_MOST_AT_ONCE}: "
+                    "the children of a step are made at once"
+                )
         check_at_least(0, seed=self.seed, domain_seed=self.domain_seed, niches_seed=self.niches_seed)
         check_numbers(lineage_share=self.lineage_share)
         object.__setattr__(self, "lineage_share", float(self.lineage_share))
@@ -267,7 +284,8 @@ class BuildConfig(SearchConfig):
         check_lineages(self.offspring, objective_lineages=self.objective_lineages)
         if self.objective != "domain" and self.replacement != "objective":
             raise NichechainError(
-                f"objective is {self.objective!r}, so replacement must be 'objective', but replacement is "
+                f"objective is {shown(self.objective)}, so replacement must be 'objective', "
+                "but replacement is "
                 f"{self.replacement!r}"
             )
 
@@ -314,7 +332,7 @@ def parse_selection(text: str) -> tuple[tuple[SelectionName, float], ...]:
         If a name is unknown or comes twice, or the shares are no shares that sum to 1.
     """
     if not isinstance(text, str):
-        raise NichechainError(f"selection is {text!r}, but must be a name, or a mixture as {_MIXTURE}")
+        raise NichechainError(f"selection is {shown(text)}, but must be a name, or a mixture as {_MIXTURE}")
     parts = [part.strip().partition(":") for part in text.split(",")]
     for name, _, _ in parts:
         check_choice("selection", name, get_args(SelectionName))
@@ -327,12 +345,12 @@ def parse_selection(text: str) -> tuple[tuple[SelectionName, float], ...]:
             shares.append(float(share))
         except ValueError:
             raise NichechainError(
-                f"selection is {text!r}, but the share of {name} must be a number, as in {_MIXTURE}"
+                f"selection is {shown(text)}, but the share of {name} must be a number, as in {_MIXTURE}"
             ) from None
     if len(set(names)) < len(names):
-        raise NichechainError(f"selection is {text!r}, but must name each of its parts once")
+        raise NichechainError(f"selection is {shown(text)}, but must name each of its parts once")
     if not all(share > 0 for share in shares) or abs(sum(shares) - 1.0) > 1e-9:
         raise NichechainError(
-            f"selection is {text!r}, but its shares must be above 0 and sum to 1, as in {_MIXTURE}"
+            f"selection is {shown(text)}, but its shares must be above 0 and sum to 1, as in {_MIXTURE}"
         )
     return tuple((cast(SelectionName, name), share) for name, share in zip(names, shares, strict=True))

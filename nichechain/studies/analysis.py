@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from nichechain.core.checks import shown
 from nichechain.core.errors import NichechainError
 from nichechain.core.intervals import mean_interval
 from nichechain.studies import paper
@@ -247,7 +248,7 @@ class _Tables:
         known = [condition.label for condition in study.conditions]
         for label in frame["condition"].unique():
             if label not in known:
-                raise NichechainError(f"condition is {label!r}, but the study's are {', '.join(known)}")
+                raise NichechainError(f"condition is {shown(label)}, but the study's are {', '.join(known)}")
         there = set(frame["condition"])
         self.labels = [label for label in known if label in there]
         self._of = {

@@ -8,7 +8,7 @@ from dataclasses import dataclass, fields
 from typing import get_args
 
 from nichechain import variation
-from nichechain.core.checks import check_at_least, check_choice
+from nichechain.core.checks import check_at_least, check_choice, shown
 from nichechain.core.errors import NichechainError
 from nichechain.core.randomness import Purpose, keyed
 from nichechain.studies.initialisation import check_scheme
@@ -62,7 +62,7 @@ class Condition(WalkSettings):
         check_choice("metric", self.metric, get_args(MetricName))
         check_choice("mode", self.mode, get_args(Mode))
         if not self.slug:
-            raise NichechainError(f"label is {self.label!r}, but must have a letter or a digit")
+            raise NichechainError(f"label is {shown(self.label)}, but must have a letter or a digit")
         check_at_least(1, litter=self.litter)
         check_scheme(self.initialisation)
         self.walk_config(0)
@@ -132,7 +132,8 @@ def selection_of(level: str) -> Selection:
         fraction = float(level)
     except (TypeError, ValueError):
         raise NichechainError(
-            f"level is {level!r}, but must be selective, better, random, or a fraction above 0 and at most 1"
+            f"level is {shown(level)}, "
+            "but must be selective, better, random, or a fraction above 0 and at most 1"
         ) from None
     return TopFraction(fraction)
 
@@ -152,7 +153,7 @@ def pressure_of(level: str) -> float:
     rule = selection_of(level)
     if isinstance(rule, TopFraction):
         return rule.fraction
-    raise NichechainError(f"level is {level!r}, which lets no fixed share of the offspring pass")
+    raise NichechainError(f"level is {shown(level)}, which lets no fixed share of the offspring pass")
 
 
 def condition_seed(seed: int, label: str) -> int:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from nichechain.core.checks import check_at_least, rng_of
+from nichechain.core.checks import check_at_least, rng_of, shown
 from nichechain.core.errors import NichechainError
 from nichechain.domains.base import Domain
 from nichechain.domains.policies.controllers import MLP
@@ -73,7 +73,7 @@ def initialise(domain: Domain, scheme: str, n: int, *, seed: int | np.random.Gen
     network = getattr(domain, "network", None)
     if not isinstance(network, MLP):
         raise NichechainError(
-            f"initialisation is {scheme!r}, but {domain.name} has no fully connected network: "
+            f"initialisation is {shown(scheme)}, but {domain.name} has no fully connected network: "
             f"it must be one of {', '.join(SCALED_SCHEMES)}"
         )
     return _network_weights(network, kind, n, rng)
@@ -98,7 +98,7 @@ def check_scheme(scheme: str) -> float:
         if 0 < factor < np.inf:
             return factor
     raise NichechainError(
-        f"initialisation is {scheme!r}, but must be one of {', '.join(NETWORK_SCHEMES)}; domain, normal "
+        f"initialisation is {shown(scheme)}, but must be one of {', '.join(NETWORK_SCHEMES)}; domain, normal "
         "or uniform with a positive factor such as normal:0.1; or elites:PATH"
     )
 

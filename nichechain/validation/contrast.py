@@ -19,13 +19,13 @@ from nichechain.births.table import LINEAGE, NONE, check_columns
 from nichechain.chain.counts import TransitionCounts
 from nichechain.chain.estimators import estimate, refitted
 from nichechain.chain.lineages import fitted_law
-from nichechain.core.checks import check_at_least
+from nichechain.core.checks import check_at_least, shown
 from nichechain.core.errors import NichechainError
 from nichechain.core.randomness import Purpose, keyed
 from nichechain.evolvability.coverage import rarefied_coverage
-from nichechain.evolvability.level import level
+from nichechain.evolvability.level import MOST_ROOTS, level
 from nichechain.evolvability.question import Question
-from nichechain.execution.side_by_side import side_by_side
+from nichechain.execution.side_by_side import side_by_side, stop_if_nobody_waits
 from nichechain.niches import Niches
 
 if TYPE_CHECKING:
@@ -200,10 +200,12 @@ def contrast(
         raise NichechainError(
             f"no niche has {min_births} births behind its row of T in both groups: lower min_births"
         )
+    chains = [estimate(counts) for counts in whole]
+    question.warn_if_long(chains[0], min(compared.size, MOST_ROOTS), 2 * resamples * draws)
     size = min(int(counts.visits.sum()) for counts in whole)
     values, spreads, freedom = [], [], []
-    for number, (side, counts) in enumerate(zip(sides, whole, strict=True)):
-        fitted = estimate(counts).posterior
+    for number, (side, counts, chain) in enumerate(zip(sides, whole, chains, strict=True)):
+        fitted = chain.posterior
         assert fitted is not None
 
         def figures(counts: TransitionCounts, draws: int, rng: np.random.Generator) -> Floats:
@@ -212,6 +214,7 @@ def contrast(
                 posterior = replace(posterior, law=fitted_law(posterior, _REPEATS))
             found = np.zeros(2)
             for _ in range(draws):
+                stop_if_nobody_waits()
                 one = replace(question, seed=int(rng.integers(2**31)))
                 found += level(posterior, compared, one, [lineages, 1]) / draws
             visits = counts.visits
@@ -261,9 +264,10 @@ def contrast(
 
 def _pooled(name: str, births: pa.Table | Sequence[pa.Table]) -> pa.Table:
     """The tables one after the other, their runs numbered on."""
-    tables = [births] if isinstance(births, pa.Table) else list(births)
-    if not tables or not all(isinstance(table, pa.Table) for table in tables):
-        raise NichechainError(f"{name} is {births!r:.60}, but must be a table of births or several")
+    tables = (births,) if isinstance(births, pa.Table) else births
+    several = isinstance(tables, Sequence) and len(tables) > 0
+    if not several or not all(isinstance(table, pa.Table) for table in tables):
+        raise NichechainError(f"{name} is {shown(births)}, but must be a table of births or several")
     taken, numbered = 0, []
     for table in tables:
         check_columns(table, *_COLUMNS)

@@ -8,7 +8,7 @@ from typing import Any, Protocol, cast, get_args, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
-from nichechain.core.checks import StepBound, check_choice, check_positive
+from nichechain.core.checks import StepBound, as_tuple, check_choice, check_positive, check_whole, shown
 from nichechain.core.errors import NichechainError
 from nichechain.domains.base import Domain, Wrapper
 from nichechain.variation.noise import IndependentNoise, MutationNoise, truncated
@@ -99,13 +99,17 @@ class AdditiveMutation:
 
     def __post_init__(self) -> None:
         check_positive(scale=self.scale)
+        object.__setattr__(self, "layers", as_tuple("layers", self.layers))
+        object.__setattr__(self, "layer_scales", as_tuple("layer_scales", self.layer_scales))
+        for weights in self.layers:
+            check_whole(weights_of_a_layer=weights)
+        for scale in self.layer_scales:
+            check_positive(layer_scale=scale)
         if len(self.layers) != len(self.layer_scales):
             raise NichechainError(
                 f"layer scales are {_listed(self.layer_scales)}, but there are {len(self.layers)} layers "
                 f"({_listed(self.layers)} weights): one scale per layer"
             )
-        for scale in self.layer_scales:
-            check_positive(layer_scale=scale)
         check_bound(self.noise, self.bound)
 
     def __call__(self, parent: Genotype, rng: np.random.Generator) -> Genotype:
@@ -239,7 +243,7 @@ def parse_step_bound(text: str, name: str = "step_bound") -> tuple[StepBound, fl
         bound = Bound(cast(StepBound, kind), float(size))
     except (ValueError, NichechainError):
         raise NichechainError(
-            f"{name} is {text!r}, but must be per-coordinate:SIZE or rescaled:SIZE with a positive "
+            f"{name} is {shown(text)}, but must be per-coordinate:SIZE or rescaled:SIZE with a positive "
             "size, such as per-coordinate:2"
         ) from None
     return bound.kind, bound.size
@@ -259,6 +263,6 @@ def parse_layer_scales(text: str, name: str = "layer_scales") -> tuple[float, ..
         scales = ()
     if not scales or not all(0 < scale < float("inf") for scale in scales):
         raise NichechainError(
-            f"{name} is {text!r}, but must be positive numbers, one per layer, such as 1,0.5,0.5"
+            f"{name} is {shown(text)}, but must be positive numbers, one per layer, such as 1,0.5,0.5"
         )
     return scales

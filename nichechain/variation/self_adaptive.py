@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from nichechain.core.checks import check_positive, check_whole
+from nichechain.core.checks import as_tuple, check_positive, check_whole
 from nichechain.core.errors import NichechainError
 from nichechain.domains.base import Domain, Evaluation, Wrapper, check_genotypes
 from nichechain.variation.additive import Bound, Genotype, add_noise, check_bound
@@ -47,6 +47,7 @@ class SelfAdaptiveMutation:
     bound: Bound | None = None
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "layers", as_tuple("layers", self.layers))
         for weights in self.layers:
             check_whole(weights_of_a_layer=weights)
         if not self.layers or min(self.layers) < 1:
@@ -82,6 +83,7 @@ class SelfAdaptiveDomain(Wrapper):
     """
 
     def __init__(self, domain: Domain, step_sizes: tuple[float, ...]) -> None:
+        step_sizes = as_tuple("step_sizes", step_sizes)
         if not step_sizes:
             raise NichechainError("step_sizes is empty, but there must be one for each layer, or one for all")
         for size in step_sizes:

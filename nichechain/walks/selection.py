@@ -13,7 +13,7 @@ from typing import Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from nichechain.core.checks import check_numbers, check_share
+from nichechain.core.checks import check_numbers, check_share, shown
 from nichechain.core.errors import NichechainError
 
 Floats = NDArray[np.float64]
@@ -104,7 +104,7 @@ class TopFraction:
     def __post_init__(self) -> None:
         check_share(fraction=self.fraction)
         if self.ties not in ("random", "all"):
-            raise NichechainError(f"ties is {self.ties!r}, but must be random or all")
+            raise NichechainError(f"ties is {shown(self.ties)}, but must be random or all")
 
     def candidates(self, scores: Scores) -> Bools:
         """The best share of the eligible, but no fewer than there are places, (R, C)."""

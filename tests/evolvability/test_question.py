@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from nichechain import NicheChain, NichechainError, l_evolvability, niche_evolvability
-from nichechain.evolvability import question
+from nichechain.evolvability import Question, question
 
 from .samples import T
 
@@ -73,3 +73,14 @@ def test_rows_of_elites_do_not_depend_on_who_else_is_asked_for():
     np.testing.assert_allclose(whole.sum(axis=1), 1.0)
     other = question.DrawnChain(rows, rows, 9.0, seed=3, number=1).children(some)
     assert np.abs(other - whole[some]).max() > 0.1
+
+
+def test_short_numbers_do_not_overflow():
+    asked = Question(np.int8(3), lineages=np.int8(100), repeats=np.int8(5), seed=np.uint8(1))
+    assert asked == Question(3, lineages=100, repeats=5, seed=1)
+    chain = NicheChain(T)
+    short, plain = (
+        l_evolvability(chain, niche=0, lineages=lineages, method="monte-carlo", repeats=3)
+        for lineages in (np.int8(100), 100)
+    )
+    assert short.value == plain.value

@@ -59,6 +59,19 @@ def test_visit_probability_equals_enumeration(form, dense, transition, steps, da
     np.testing.assert_allclose(passes, expected_passes, rtol=1e-12, atol=1e-14)
 
 
+@pytest.mark.parametrize("form", [np.array, sparse.csr_array])
+def test_long_walks_are_followed_until_nothing_changes(form):
+    # A half of the walk moves on from 0 to 1 at each step, and nothing comes back from 2.
+    transition = np.array([[0.5, 0.5, 0.0], [0.0, 0.8, 0.2], [0.0, 0.0, 1.0]])
+    first = np.array([1.0, 0.0, 0.0])
+    short, long = (visit_probability(form(transition), first, steps) for steps in (1000, 1001))
+    np.testing.assert_allclose(long[0], short[0], rtol=1e-12)
+    np.testing.assert_allclose(long[1], short[1] + [0, 0, 1], rtol=1e-12)
+    visit, passes = visit_probability(form(transition), first, 10**18)
+    np.testing.assert_allclose(visit, 1.0)
+    np.testing.assert_allclose(passes, [2.0, 5.0, 1e18], rtol=1e-12)
+
+
 @given(transition=transitions(), longest=st.integers(1, 12))
 @settings(max_examples=40, deadline=None)
 def test_returns_are_diagonals_of_powers(transition, longest):

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import itertools
+
 import pytest
 
-from nichechain.execution.side_by_side import side_by_side
+from nichechain.execution.side_by_side import side_by_side, stop_if_nobody_waits
 
 
 def test_results_come_in_the_order_of_the_items():
@@ -21,3 +23,30 @@ def test_an_error_is_that_of_the_first_item_that_has_one():
 
     with pytest.raises(ValueError, match=r"^1$"):
         side_by_side(odd, range(9))
+
+
+class _StoppedError(Exception):
+    pass
+
+
+def _stop(_: int) -> None:
+    raise _StoppedError
+
+
+def test_items_without_end_are_taken_as_they_are_needed():
+    taken = itertools.count()
+    with pytest.raises(_StoppedError):
+        side_by_side(lambda x: x, taken, _stop)
+    assert next(taken) < 1000
+
+
+def test_a_long_computation_ends_when_nobody_waits_for_it():
+    def call(x: int) -> int:
+        while x:
+            stop_if_nobody_waits()
+        return x
+
+    with pytest.raises(_StoppedError):
+        side_by_side(call, range(5), _stop)
+    # Elsewhere there is nobody who could have gone.
+    stop_if_nobody_waits()

@@ -92,7 +92,12 @@ CALLS = (
     Call(
         "TransitionCounts.from_trajectories",
         lambda w: {"trajectories": [[0, 1, 2], [3]], "niches": w.niches},
-        {"trajectories": (3, [3], [[0, 7]], [[0.5]], [["a"]], [[[0], [1, 2]]], [[-1, 0]])},
+        {
+            "trajectories": (
+                *(3, [3], [[0, 7]], [[0.5]], [["a"]], [[[0], [1, 2]]], [[-1, 0]]),
+                *(np.array(3), sparse.coo_matrix(np.eye(2))),
+            )
+        },
     ),
     Call(
         "TransitionCounts.from_matrix",
@@ -215,8 +220,8 @@ CALLS = (
         "validation.contrast.contrast",
         lambda w: {"first": w.table, "second": w.table, "niches": w.archive.niches, "resamples": 2},
         {
-            "first": (Made(lambda w: w.table.slice(0, 0), "no-births"),),
-            "second": (Made(lambda w: w.table.drop_columns(["child_niche"]), "no-column"),),
+            "first": (np.array(3), [], [3], Made(lambda w: w.table.slice(0, 0), "no-births")),
+            "second": (np.array(3), Made(lambda w: w.table.drop_columns(["child_niche"]), "no-column")),
             "niches": (_OTHER,),
             "min_births": (*whole(-1)[1:], 10_000),
             "resamples": whole(1),
@@ -327,7 +332,7 @@ CALLS = (
             },
             {
                 "roots": ([3], [-1], [0.5], "three"),
-                "longest": whole(0),
+                "longest": (10**30, *whole(0)),
                 "lineages": ([], [0, 1], [0.5], "three"),
                 "counted": (-1, 4, *whole(0)[2:]),
             },
@@ -344,7 +349,12 @@ CALLS = (
             "repeats": 2,
             "rng": w.rng,
         },
-        {"steps": whole(0), "lineages": whole(0), "repeats": whole(0), "counted": (-1, 4, 1.5)},
+        {
+            "steps": whole(0),
+            "lineages": (10**30, *whole(0)),
+            "repeats": whole(0),
+            "counted": (-1, 4, 1.5),
+        },
     ),
     Call(
         "evolvability.coverage.rarefied_coverage",

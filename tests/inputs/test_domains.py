@@ -85,12 +85,16 @@ CALLS = (
     Call(
         "domains.watch",
         lambda w: {"domain": PlanarArm(joints=2), "genotype": [0.1, 0.2]},
-        {"genotype": ([], [0.1], [[0.1, 0.2]], [np.nan, 0.0])},
+        {"genotype": ([], [0.1], [[0.1, 0.2]], [np.nan, 0.0], ["a", "b"])},
     ),
     Call("niches.GridNiches.of", lambda w: {"self": w.niches, "behavior": [[0, 0]]}, {"behavior": _BEHAVIOR}),
     Call("niches.GridNiches.flat", lambda w: {"self": w.niches, "niche": 0}, {"niche": _BAD_NICHE}),
     Call("niches.GridNiches.index", lambda w: {"self": w.niches, "flat": 0}, {"flat": (-1, 6, "0", 1.5)}),
-    Call("niches.GridNiches.label", lambda w: {"self": w.niches, "state": 0}, {"state": (-1, 7, "0", 1.5)}),
+    Call(
+        "niches.GridNiches.label",
+        lambda w: {"self": w.niches, "state": 0},
+        {"state": (-1, 7, "0", 1.5, 1j * np.eye(2))},
+    ),
     Call(
         "niches.GridNiches.as_grid",
         lambda w: {"self": w.niches, "values": np.zeros(6)},
@@ -116,32 +120,44 @@ CALLS = (
     Call(
         "niches.CVTNiches.tessellated",
         lambda w: {"number": 3, "bounds": _BOX},
-        {"number": (*whole(0), 10**12), "bounds": _BAD_BOUNDS[1:], "seed": SEED, "outside": UNKNOWN},
+        {"number": (*whole(0), 10**12), "bounds": (*_BAD_BOUNDS[1:], ()), "seed": SEED, "outside": UNKNOWN},
     ),
     Call("niches.CVTNiches.of", lambda w: {"self": w.cvt, "behavior": [[0, 0]]}, {"behavior": _BEHAVIOR}),
     Call(
         "niches.CVTNiches.flat", lambda w: {"self": w.cvt, "niche": 0}, {"niche": (-1, 3, (0, 0), "0", 1.5)}
     ),
     Call("niches.CVTNiches.index", lambda w: {"self": w.cvt, "flat": 0}, {"flat": (-1, 3, "0", 1.5)}),
-    Call("niches.CVTNiches.label", lambda w: {"self": w.cvt, "state": 0}, {"state": (-1, 4, "0", 1.5)}),
+    Call(
+        "niches.CVTNiches.label",
+        lambda w: {"self": w.cvt, "state": 0},
+        {"state": (-1, 4, "0", 1.5, 1j * np.eye(2))},
+    ),
     Call(
         "niches.one_hot",
         lambda w: {"behavior": [[0, 0]], "niches": w.niches},
-        {"behavior": (np.zeros((1, 3)), [[np.inf, 0.0]], 1.0, *RAGGED)},
+        {"behavior": (np.zeros((1, 3)), [], [[np.inf, 0.0]], 1.0, *RAGGED)},
     ),
-    Call("niches.parse_shape", lambda w: {"text": "3x2"}, {"text": ("", "0x2", "3,2", "3x", "-1x2", "axb")}),
+    Call(
+        "niches.parse_shape",
+        lambda w: {"text": "3x2"},
+        {"text": ("", "0x2", "3,2", "3x", "-1x2", "axb", b"3x2", np.eye(2))},
+    ),
     Call(
         "niches.parse_bounds",
         lambda w: {"text": "0,1,0,2"},
-        {"text": ("", "0,1,0", "1,0,0,2", "0,inf", "0,nan", "a,b")},
+        {"text": ("", "0,1,0", "1,0,0,2", "0,inf", "0,nan", "a,b", b"0,1", 3)},
     ),
     Call(
         "niches.parse_niche",
         lambda w: {"text": "1,2"},
-        {"text": ("", "a", "1;2", "0.5")},
+        {"text": ("", "a", "1;2", "0.5", b"1,2", np.eye(2))},
     ),
-    Call("niches.parse_niches", lambda w: {"text": "cvt:4"}, {"text": ("", "4", "cvt:0", "cvt:x", "grid:4")}),
-    Call("domains.make", lambda w: {"name": "arm"}, {"name": ("no-such-thing",), "seed": SEED}),
+    Call(
+        "niches.parse_niches",
+        lambda w: {"text": "cvt:4"},
+        {"text": ("", "4", "cvt:0", "cvt:x", "grid:4", b"cvt:4", np.array(["cvt:4"]))},
+    ),
+    Call("domains.make", lambda w: {"name": "arm"}, {"name": ("no-such-thing", 3, b"arm"), "seed": SEED}),
     Call(
         "domains.make",
         lambda w: {"name": "arm", "joints": 3},
@@ -158,7 +174,7 @@ CALLS = (
     Call(
         "domains.PlanarArm.sample",
         lambda w: {"self": w.arm, "n": 2, "seed": 0},
-        {"n": whole(-1), "seed": SEED},
+        {"n": (10**30, *whole(-1)), "seed": SEED},
     ),
     Call(
         "domains.PlanarArm.evaluate",
@@ -168,7 +184,7 @@ CALLS = (
     Call(
         "domains.LinearMap.sample",
         lambda w: {"self": w.linear, "n": 2, "seed": 0},
-        {"n": whole(-1), "seed": SEED},
+        {"n": (10**30, *whole(-1)), "seed": SEED},
     ),
     Call(
         "domains.LinearMap.evaluate",
@@ -184,16 +200,16 @@ CALLS = (
         "domains.GymDomain",
         lambda w: {"env_id": "MountainCarContinuous-v0", "descriptor": "final-observation:0", "steps": 2},
         {
-            "env_id": ("NoSuch-v0", "no such thing"),
+            "env_id": ("NoSuch-v0", "no such thing", 3, np.eye(2)),
             "descriptor": ("no-such-thing", "final-observation:99", "final-observation:x"),
             "bounds": (((1.0, 0.0),), ((0.0, np.nan),), "0,1"),
-            "names": (("x", "y", "z"),),
-            "controller": ("lstm", "mlp:x", "mlp:0"),
+            "names": (("x", "y", "z"), (3,), np.array(3)),
+            "controller": ("lstm", "mlp:x", "mlp:0", np.eye(2)),
             "steps": whole(0),
             "seed": SEED,
             "repeats": whole(0),
-            "observations": (("no-such-key",),),
-            "env_options": ({"no_such_option": 1},),
+            "observations": (("no-such-key",), np.array(3)),
+            "env_options": ({"no_such_option": 1}, np.eye(2)),
         },
     ),
     *(
@@ -208,7 +224,7 @@ CALLS = (
     Call(
         "domains.Noise.parse",
         lambda w: {"text": "action:0.1"},
-        {"text": ("", "action", "action:x", "wind:1")},
+        {"text": ("", "action", "action:x", "wind:1", b"action:0.1", np.eye(2))},
     ),
     Call(
         "domains.Noisy",
@@ -219,7 +235,7 @@ CALLS = (
         "domains.WithSensitivity",
         lambda w: {"domain": w.noisy, "axes": ("x", "sensitivity")},
         {
-            "axes": ((), ("x",), ("x", "x", "sensitivity"), ("x", "wind")),
+            "axes": ((), ("x",), ("x", "x", "sensitivity"), ("x", "wind"), np.array(3), (3, "sensitivity")),
             "most": POSITIVE,
         },
     ),
@@ -245,19 +261,19 @@ CALLS = (
         lambda w: {"noise": CauchyNoise(), "layers": (2, 3), "layer_scales": (1.0, 0.5)},
         {
             "scale": POSITIVE,
-            "layers": ((2,), (2, 3, 4)),
-            "layer_scales": ((1.0,), (1.0, 0.0), (1.0, np.nan), (1.0, "three")),
+            "layers": ((2,), (2, 3, 4), np.array(3), (None, 3)),
+            "layer_scales": ((1.0,), (1.0, 0.0), (1.0, np.nan), (1.0, "three"), np.array(3), (None, 1.0)),
         },
     ),
     Call(
         "variation.SelfAdaptiveMutation",
         lambda w: {"noise": CauchyNoise(), "layers": (2, 3)},
-        {"layers": ((), (0, 2), (1.5, 2), ("a",))},
+        {"layers": ((), (0, 2), (1.5, 2), ("a",), np.array(3), np.array([2**64 - 1, 0], np.uint64))},
     ),
     Call(
         "variation.SelfAdaptiveDomain",
         lambda w: {"domain": w.arm, "step_sizes": (1.0,)},
-        {"step_sizes": ((0.0,), (-1.0,), (np.nan,), ("three",), ())},
+        {"step_sizes": ((0.0,), (-1.0,), (np.nan,), ("three",), (), np.array(3), 1j * np.eye(2))},
     ),
     Call(
         "variation.polynomial.PolynomialMutation",
@@ -272,8 +288,8 @@ CALLS = (
         "domains.policies.controllers.MLP",
         lambda w: {"sizes": (3, 4, 2)},
         {
-            "sizes": ((3,), (3, 0, 2), (3, -1, 2), (), (3, 1.5, 2), ("a", 2)),
-            "hidden": ("sigmoid", ("relu", "relu"), ("sigmoid",)),
+            "sizes": ((3,), (3, 0, 2), (3, -1, 2), (), (3, 1.5, 2), ("a", 2), np.array(3)),
+            "hidden": ("sigmoid", ("relu", "relu"), ("sigmoid",), np.array(3)),
             "output": UNKNOWN,
         },
     ),
@@ -288,7 +304,7 @@ CALLS = (
     Call(
         "domains.policies.controllers.MLP.sample",
         lambda w: {"self": w.mlp, "n": 1, "seed": 0},
-        {"n": whole(-1), "seed": SEED},
+        {"n": (10**30, *whole(-1)), "seed": SEED},
     ),
     Call(
         "domains.policies.controllers.MLP.module",

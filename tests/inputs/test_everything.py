@@ -195,7 +195,7 @@ EXEMPT: dict[tuple[str, str], str] = {
             "parent child run uid elite step lineage objective",
             "names of columns, which import_births looks for",
         ),
-        ("search.config.BuildConfig", "domain outside mutation epsilon", _LATER),
+        ("search.config.BuildConfig", "domain epsilon", _LATER),
         ("core.randomness.keyed", "seed purpose index", "called for every birth; NumPy refuses no seeds"),
         ("studies.conditions.condition_seed", "label", _TEXT),
         ("niches.parsing.parse_bounds", "name", _TEXT),

@@ -64,18 +64,21 @@ CALLS = (
     Call(
         "Archive.counts_of",
         lambda w: {"self": w.archive},
-        {"run": (-1, 99, "first"), "steps": ((3, 1), (-1, 2), (1,), "all")},
+        {"run": (-1, 99, "first", 1j * np.eye(2)), "steps": ((3, 1), (-1, 2), (1,), "all", np.array(3))},
     ),
     Call("Archive.chain", lambda w: {"self": w.archive}, {"estimator": UNKNOWN}),
     Call(
         "BuildConfig",
         lambda w: {"domain": "arm", "shape": (3, 2), "bounds": ((0, 1), (0, 1))},
         {
-            "shape": (("a", 2), 3, None, (2.5, 2)),
-            "bounds": ("0,1", ((0,), (1,)), None),
+            "shape": (("a", 2), 3, None, (2.5, 2), np.full((6, 6), 2**63, np.uint64)),
+            "bounds": ("0,1", ((0,), (1,)), None, np.full((6, 6), 2**63, np.uint64)),
             "evaluations": whole(0),
-            "initial": whole(0),
-            "batch": whole(0),
+            "initial": (10**18, *whole(0)),
+            "batch": (10**18, *whole(0)),
+            "mutation": ([1.0], None),
+            "outside": (["state"],),
+            "self_adaptive": (1, "no", []),
             "scale": ("three", None),
             "replacement": UNKNOWN,
             "seed": SEED,
@@ -84,8 +87,8 @@ CALLS = (
             "niches_seed": SEED,
             "domain_options": ("joints=3", {3: 3}, {"joints": None}, {"joints": np.nan}),
             "df": ("three",),
-            "step_bound": ("rescaled", ("rescaled", "a"), ("rescaled",)),
-            "layer_scales": (("a",),),
+            "step_bound": ("rescaled", ("rescaled", "a"), ("rescaled",), np.array(3), 1.0),
+            "layer_scales": (("a",), np.array(3), 1.0),
             "selection": (*UNKNOWN, "reach:0.7", "reach:0.7,uniform:0.7", "reach:a,uniform:0.5", 3, None),
             "temperature": ("three", 0.0, -1.0, np.nan),
             "selection_l": whole(0),
@@ -162,6 +165,8 @@ CALLS = (
         {
             "folders": (
                 (),
+                np.array(3),
+                (3, 4),
                 Made(lambda w: (w.archive.folder,), "one"),
                 Made(lambda w: (w.archive.folder, w.archive.folder), "itself"),
                 Made(lambda w: (w.archive.folder, w.other), "other-niches"),
@@ -176,6 +181,8 @@ CALLS = (
         {
             "log": (
                 "/no/such/log.csv",
+                "/dev/zero",
+                "a\0b.csv",
                 _written("log.txt", ""),
                 _written("empty.csv", ""),
                 _written("header.csv", "parent_niche,child_niche\n"),
@@ -193,6 +200,7 @@ CALLS = (
             "folder": (Made(lambda w: w.archive.folder, "an-archive"),),
             "columns": (
                 Columns(parent="no-such-column"),
+                np.eye(2),
                 Made(lambda w: Columns(lineage="child_niche"), "no-flag"),
             ),
             "axes": (Axes(names=("x",)),),

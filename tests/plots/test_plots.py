@@ -1,3 +1,6 @@
+import copy
+import io
+
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
@@ -136,3 +139,11 @@ def test_dollars_in_names_are_no_formulas(archive):
     assert ax.xaxis.label.get_text().replace("\\$", "$") == name
     behavior_axes(ax, archive)
     assert "$" not in ax.get_xlabel()
+
+
+def test_axes_of_very_different_length_are_not_to_scale(archive, ax):
+    wide = copy.copy(archive)
+    wide.niches = nc.GridNiches(archive.niches.shape, ((-1.0, 1.0), (-0.9, 1e19)))
+    plots.plot_visits(wide, ax)
+    assert ax.get_aspect() == "auto"
+    ax.figure.savefig(io.BytesIO())

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from nichechain.chain.model import NicheChain
-from nichechain.core.checks import as_floats, check_at_least, check_numbers, check_seed
+from nichechain.core.checks import as_floats, check_at_least, check_numbers, check_seed, shown
 from nichechain.core.errors import NichechainError
 from nichechain.core.randomness import Purpose, keyed
 
@@ -80,7 +80,7 @@ def posterior_interval(
     interval says what births leave open if the estimator's model is right.
     """
     if not callable(question):
-        raise NichechainError(f"question is {question!r}, but must be a function of a chain")
+        raise NichechainError(f"question is {shown(question)}, but must be a function of a chain")
     check_at_least(2, draws=draws)
     check_numbers(level=level)
     if not 0.0 < level < 1.0:

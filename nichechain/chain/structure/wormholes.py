@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
@@ -82,7 +83,7 @@ def wormholes(
 
     check_choice("beyond", beyond, get_args(Beyond))
     check_numbers(times=times, expected_false=expected_false)
-    if not (np.isfinite(times) and times >= 1.0):
+    if not 1.0 <= times < math.inf:
         raise NichechainError(f"times is {times}, but must be at least 1")
     if not expected_false >= 0.0:
         raise NichechainError(f"expected_false is {expected_false}, but must not be negative")
@@ -112,7 +113,7 @@ def wormholes(
             "destination": destination,
             "probability": mass / (mass + rest),
             # The Beta marginal's upper tail; no probability exceeds 1.
-            "exceeds": betaincc(mass, rest, np.minimum(times * expected, 1.0)),
+            "exceeds": betaincc(mass, rest, np.minimum(float(times) * expected, 1.0)),
             "singleton": count == 1,
         }
     )

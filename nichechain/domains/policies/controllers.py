@@ -11,7 +11,14 @@ from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from nichechain.core.checks import as_floats, check_at_least, check_choice, check_whole, rng_of
+from nichechain.core.checks import (
+    as_floats,
+    as_tuple,
+    check_choice,
+    check_sample,
+    check_whole,
+    rng_of,
+)
 from nichechain.core.errors import NichechainError
 
 if TYPE_CHECKING:
@@ -120,10 +127,13 @@ class MLP:
     evolve_biases: bool = False
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "sizes", as_tuple("layer sizes", self.sizes))
         for size in self.sizes:
             check_whole(layer_size=size)
         if len(self.sizes) < 2 or min(self.sizes) < 1:
             raise NichechainError(f"layer sizes are {self.sizes}, but two or more positive ones are needed")
+        if not isinstance(self.hidden, str):
+            object.__setattr__(self, "hidden", as_tuple("hidden", self.hidden))
         if not isinstance(self.hidden, str) and len(self.hidden) != len(self.sizes) - 2:
             raise NichechainError(
                 f"hidden has {len(self.hidden)} activations, "
@@ -270,7 +280,7 @@ class MLP:
         """
         import torch
 
-        check_at_least(0, n=n)
+        n = check_sample(n, self.genotype_length)
         generator = torch.Generator().manual_seed(int(rng_of(seed).integers(2**63)))
         genotypes = np.empty((n, self.genotype_length), np.float32)
         for row in genotypes:
@@ -347,7 +357,7 @@ class ModuleController:
         """
         import torch
 
-        check_at_least(0, n=n)
+        n = check_sample(n, self.genotype_length)
         generator = torch.Generator().manual_seed(int(rng_of(seed).integers(2**63)))
         genotypes = np.zeros((n, self.genotype_length), np.float32)
         for row in genotypes:

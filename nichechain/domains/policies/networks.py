@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from nichechain.core.checks import shown
 from nichechain.core.errors import NichechainError
 from nichechain.domains.policies.controllers import MLP, Controller, ModuleController
 
@@ -45,9 +46,13 @@ def network(
         units = [word.strip() for word in layers.split(",")] if layers else []
         if kind not in _HIDDEN or not colon or not all(u.isdecimal() and u.isascii() for u in units):
             raise NichechainError(
-                f"controller is {controller!r}, but must be mlp:UNITS,UNITS or mlp-tanh:UNITS,UNITS"
+                f"controller is {shown(controller)}, but must be mlp:UNITS,UNITS or mlp-tanh:UNITS,UNITS"
             )
         return MLP((inputs, *map(int, units), outputs), _HIDDEN[kind], output, evolve_biases)
+    if not hasattr(controller, "parameters"):
+        raise NichechainError(
+            f"controller is {shown(controller)}, but must be a torch.nn.Module or a text such as mlp:64,64"
+        )
     made = MLP.of(controller, evolve_biases=evolve_biases) or ModuleController(controller, inputs, outputs)
     if (made.inputs, made.outputs) != (inputs, outputs):
         raise NichechainError(

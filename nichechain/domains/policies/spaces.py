@@ -10,6 +10,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from nichechain.core.checks import as_tuple, check_text, shown
 from nichechain.core.errors import NichechainError
 
 Floats = NDArray[np.float64]
@@ -79,15 +80,17 @@ class Observations:
         """
         from gymnasium import spaces
 
+        keys = as_tuple("observations", keys)
         if not isinstance(space, spaces.Dict):
             if keys:
                 raise NichechainError(f"observations are {space}, which has no keys to choose from")
             return cls(tuple(_parts(space, ())))
-        chosen = tuple(keys) or (("observation",) if "observation" in space.spaces else tuple(space.spaces))
+        chosen = keys or (("observation",) if "observation" in space.spaces else tuple(space.spaces))
         for key in chosen:
+            check_text(**{"key of observations": key})
             if key not in space.spaces:
                 raise NichechainError(
-                    f"observations have no key {key!r}: they have {', '.join(space.spaces)}"
+                    f"observations have no key {shown(key)}: they have {', '.join(space.spaces)}"
                 )
         return cls(tuple(part for key in chosen for part in _parts(space.spaces[key], (key,))))
 

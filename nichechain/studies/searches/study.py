@@ -6,7 +6,7 @@ import re
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
-from nichechain.core.checks import check_at_least
+from nichechain.core.checks import check_at_least, shown
 from nichechain.core.errors import NichechainError
 from nichechain.search.config import BuildConfig
 
@@ -70,12 +70,13 @@ class SelectionStudy:
         check_at_least(0, elites=self.elites)
         if self.config.objective != "domain":
             raise NichechainError(
-                f"objective is {self.config.objective!r}, but a study of selections compares searches that "
+                f"objective is {shown(self.config.objective)}, "
+                "but a study of selections compares searches that "
                 "keep what the domain's objective or replacement says"
             )
         if isinstance(self.selections, str):
             raise NichechainError(
-                f"selections is {self.selections!r}, but must be several, such as ('uniform', 'reach')"
+                f"selections is {shown(self.selections)}, but must be several, such as ('uniform', 'reach')"
             )
         object.__setattr__(self, "selections", tuple(self.selections))
         if REFERENCE not in self.selections:

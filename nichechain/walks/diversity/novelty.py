@@ -8,7 +8,7 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from nichechain.core.checks import check_at_least, check_share
+from nichechain.core.checks import check_at_least, check_share, shown
 from nichechain.core.errors import NichechainError
 
 Floats = NDArray[np.float64]
@@ -71,7 +71,7 @@ class ArchiveRule:
             ("scope", self.scope, get_args(Scope)),
         ):
             if value not in allowed:
-                raise NichechainError(f"archive {name} is {value!r}, but must be {' or '.join(allowed)}")
+                raise NichechainError(f"archive {name} is {shown(value)}, but must be {' or '.join(allowed)}")
 
     @property
     def chance(self) -> float:
