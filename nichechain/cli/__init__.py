@@ -7,6 +7,7 @@ import contextlib
 import importlib
 import keyword
 import os
+import re
 import sys
 from collections.abc import Sequence
 from typing import Any
@@ -106,11 +107,19 @@ def _run(given: Sequence[str]) -> int:
         if debug:
             raise
         return _fail(f"not enough memory: {error or 'ask for less'}")
+    except (ValueError, OverflowError) as error:
+        # What NumPy says of a shape that no memory holds.
+        if debug or not _TOO_LARGE.search(str(error)):
+            raise
+        return _fail(f"not enough memory, as a number that was asked for is too large: {error}")
     except OSError as error:
         if debug:
             raise
         return _fail(f"{error.strerror or error}: {error.filename}" if error.filename else str(error))
     return status
+
+
+_TOO_LARGE = re.compile("Maximum allowed dimension|array is too big|too large to convert")
 
 
 def module_of(command: str) -> Any:

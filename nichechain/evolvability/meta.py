@@ -14,7 +14,7 @@ from nichechain.core.checks import check_at_least, check_lineages, check_seed
 from nichechain.core.intervals import mean_interval
 from nichechain.core.randomness import Purpose
 from nichechain.core.rarefaction import niches_among
-from nichechain.variation.unborn import Unborn, litters
+from nichechain.variation.unborn import Unborn, check_litter, litters
 
 if TYPE_CHECKING:
     from nichechain.archive.archive import Archive, Elite
@@ -107,6 +107,7 @@ def meta_evolvability(
     check_seed(seed)
     most = min(offspring, children)
     check_lineages(most, lineages=lineages)
+    check_litter(offspring, children)
     size = most if lineages is None else lineages
     mutate = archive.mutate
 

@@ -111,6 +111,7 @@ def visit_metrics(
     uniform: compare uniformity and entropy at equal l and U only.
     """
     question = Question(l, lineages, convention, repeats=repeats, draws=draws, seed=seed)
+    lineages = question.lineages
     root = Root(chain, niche=niche, offspring=offspring)
     size = question.repeats_of_each(chain)
     own = root.visited(question)

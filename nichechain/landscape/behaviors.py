@@ -225,7 +225,10 @@ def hull_volume(behaviors: ArrayLike) -> float:
     axes = points.shape[1]
     if axes == 1:
         return float(np.ptp(points))
-    centered = points - points.mean(axis=0)
+    with np.errstate(over="ignore", invalid="ignore"):
+        centered = points - points.mean(axis=0)
+    if not np.isfinite(centered).all():
+        raise NichechainError(f"behaviors have the value {np.abs(points).max():g}, which is too large to add")
     _, extent, direction = np.linalg.svd(centered, full_matrices=False)
     flat = np.finfo(np.float64).eps * max(points.shape) * np.abs(points).max()
     if len(points) <= axes or extent[-1] <= flat:

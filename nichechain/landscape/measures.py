@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from nichechain.births.table import NONE
 from nichechain.core.arrays import present
-from nichechain.core.checks import as_floats, check_at_least
+from nichechain.core.checks import as_floats, as_tuple, check_at_least
 from nichechain.core.errors import NichechainError
 from nichechain.landscape.behaviors import (
     EPSILON,
@@ -138,6 +138,7 @@ def find_measures(names: Sequence[str]) -> tuple[Measure, ...]:
     NichechainError
         If there are no names, or no measure bears one of them.
     """
+    names = as_tuple("names", names)
     if not names:
         raise NichechainError("no measure is named, but at least one is needed")
     return tuple(dict.fromkeys(find_measure(name) for name in names))

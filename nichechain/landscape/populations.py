@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nichechain.births.table import check_columns
+from nichechain.core.checks import shown
 from nichechain.core.errors import NichechainError
 from nichechain.landscape.behaviors import one_hot_evolvability, population_evolvability
 from nichechain.niches import Niches
@@ -44,6 +45,8 @@ def population_course(births: pd.DataFrame, niches: Niches) -> pd.DataFrame:
     """
     import pandas as pd
 
+    if not isinstance(births, pd.DataFrame):
+        raise NichechainError(f"births is {shown(births)}, but must be a DataFrame of births")
     axes = sorted(name for name in births.columns if str(name).startswith("behavior_"))
     check_columns(births, "run", "step", "child_niche")
     if len(axes) != len(niches.bounds):

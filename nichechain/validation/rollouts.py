@@ -30,6 +30,9 @@ OnDone = Callable[[int], None]
 OFFSPRING = 30
 MIN_BIRTHS = 20
 
+# States of lineages that are kept, of 8 bytes each.
+_MOST_STATES = 2**28
+
 
 @dataclass(frozen=True)
 class Lineages:
@@ -166,6 +169,11 @@ def run_lineages(
     """
     check_at_least(1, l=l, lineages=lineages, offspring=offspring)
     check_seed(seed)
+    most = _MOST_STATES // max(1, len(roots) * lineages)
+    if l > most:
+        raise NichechainError(
+            f"l is {l}, but must be at most {most} for {lineages} lineages of each of {len(roots)} elites"
+        )
     elites = np.stack([archive.elite(int(root)).genotype for root in roots])
     mutate, niches = archive.mutate, archive.niches
 

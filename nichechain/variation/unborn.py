@@ -13,8 +13,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from nichechain.core.errors import NichechainError
 from nichechain.core.randomness import Purpose, keyed
 from nichechain.variation.additive import Mutation
+
+# Children that are described together, with 16 bytes each.
+_MOST_CHILDREN = 2**28
 
 Float32s = NDArray[np.float32]
 Ints = NDArray[np.int64]
@@ -79,8 +83,22 @@ def litters(mutate: Mutation, purpose: Purpose, parents: Float32s, seed: int, si
     The i-th child of every parent is made with the same noise.
     """
     count = len(parents)
+    check_litter(size, count)
     each = np.repeat(np.arange(count), size)
     return Unborn(mutate, purpose, parents, (seed,) * count, each, np.tile(np.arange(size), count))
+
+
+def check_litter(offspring: int, parents: int) -> None:
+    """Refuse more children than can be described at once.
+
+    Raises
+    ------
+    NichechainError
+        If there are too many of each parent.
+    """
+    most = _MOST_CHILDREN // max(1, parents)
+    if offspring > most:
+        raise NichechainError(f"offspring is {offspring}, but must be at most {most} of each parent")
 
 
 def grown(genotypes: Float32s | Unborn) -> Float32s:

@@ -40,7 +40,7 @@ CALLS = (
         "genotype_evolvability",
         lambda w: {"archive": w.archive, "elite": w.elite, "offspring": 2, "draws": 2},
         {
-            "offspring": whole(-1),
+            "offspring": (10**30, *whole(-1)),
             "first_generation": UNKNOWN,
             "strength": POSITIVE,
             **_ASKED,
@@ -51,7 +51,7 @@ CALLS = (
         lambda w: {"archive": w.archive, "elite": w.elite, "children": 3, "offspring": 2},
         {
             "children": whole(1),
-            "offspring": whole(0),
+            "offspring": (10**30, *whole(0)),
             "lineages": (3, *whole(0)),
             "seed": SEED,
         },

@@ -211,7 +211,7 @@ CALLS = (
         },
         {
             "roots": (Made(lambda w: np.array([10_000]), "no-such-state"),),
-            "l": whole(0),
+            "l": (10**30, *whole(0)),
             "lineages": whole(0),
             "offspring": whole(0),
             "seed": SEED,

@@ -61,7 +61,7 @@ CALLS = (
     Call(
         "landscape.population_course",
         lambda w: {"births": w.births, "niches": w.archive.niches},
-        {"births": (Made(lambda w: w.births.drop(columns="step"), "no-step"),)},
+        {"births": (np.eye(3), Made(lambda w: w.births.drop(columns="step"), "no-step"))},
     ),
     Call(
         "landscape.one_hot_evolvability",
@@ -76,7 +76,7 @@ CALLS = (
     Call(
         "landscape.hull_volume",
         lambda w: {"behaviors": np.eye(3)},
-        {"behaviors": (np.zeros(3), np.zeros((2, 0)), [[np.inf, 0.0]], 1.0, *RAGGED)},
+        {"behaviors": (np.zeros(3), np.zeros((2, 0)), [[np.inf, 0.0]], np.full((3, 2), 1e308), 1.0, *RAGGED)},
     ),
     Call(
         "landscape.find_dissimila",
@@ -89,7 +89,9 @@ CALLS = (
         },
     ),
     Call("landscape.find_measure", lambda w: {"name": "ratio"}, {"name": UNKNOWN}),
-    Call("landscape.find_measures", lambda w: {"names": ["ratio"]}, {"names": ([], ["nothing"])}),
+    Call(
+        "landscape.find_measures", lambda w: {"names": ["ratio"]}, {"names": ([], ["nothing"], np.array(3))}
+    ),
     Call(
         "landscape.measure_behaviors",
         lambda w: dict(_PAIR),
@@ -122,7 +124,7 @@ CALLS = (
     Call(
         "landscape.measure_archive",
         lambda w: {"archive": w.archive, "offspring": 2, "elites": 2},
-        {"offspring": whole(1), "seed": SEED, "elites": whole(0), "share": _SHARE},
+        {"offspring": (10**30, *whole(1)), "seed": SEED, "elites": whole(0), "share": _SHARE},
     ),
     Call(
         "landscape.niche_table",
