@@ -85,7 +85,7 @@ def _check(command: EstimateCommand) -> None:
 
 
 def _estimate(command: EstimateCommand, archive: Archive) -> None:
-    chain = archive.chain(command.estimator)
+    chain = progress.estimated(archive, command.estimator)
     counts, posterior = archive.counts, chain.posterior
     births = int(counts.births.sum())
     content: dict[str, Any] = {

@@ -93,7 +93,7 @@ def run(arguments: Sequence[str]) -> int:
     if command.meta is not None:
         return meta.show(command, load(command.path))
     archive = parsing.seen(load(command.path), command.steps)
-    chain = archive.chain(command.estimator, unvisited=command.unvisited)
+    chain = progress.estimated(archive, command.estimator, unvisited=command.unvisited)
     if command.niche is not None or command.elite is not None:
         frame = _one(command, archive, chain)
     elif command.rank == "elites":

@@ -48,10 +48,10 @@ def run(arguments: Sequence[str]) -> int:
 
     archive = parsing.seen(load(command.path), command.steps)
     other = None if command.beside is None else parsing.seen(load(command.beside), command.steps)
-    chain = archive.chain(command.estimator)
-    pairs = (
-        [(archive, chain)] if other is None else [(archive, chain), (other, other.chain(command.estimator))]
-    )
+    chain = progress.estimated(archive, command.estimator)
+    pairs = [(archive, chain)]
+    if other is not None:
+        pairs.append((other, progress.estimated(other, command.estimator)))
     draws = sum(draws_of(each) if command.draws is None else command.draws for _, each in pairs)
     with progress.adding(draws, "draws of T") as tell:
         write_explorer(

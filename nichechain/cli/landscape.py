@@ -168,7 +168,7 @@ def _results(
     from nichechain.evolvability.niches import answer_for_niches
     from nichechain.evolvability.question import Question
 
-    chain = archive.chain()
+    chain = progress.estimated(archive)
     question = Question(command.l, command.lineages, seed=command.seed)
     inside = found.state < len(archive.niches)
     asked = np.unique(found.state[inside]) if inside.any() else None

@@ -114,11 +114,11 @@ def run(arguments: Sequence[str]) -> int:
 
 
 def _draw_pair(command: PlotCommand, archive: Archive, left: Axes, right: Axes) -> None:
-    chain = archive.chain(command.estimator)
     if command.kind == "growth":
         from nichechain.plots.growth import check_growth
 
-        check_growth(chain)
+        check_growth(archive.niches.states)
+    chain = progress.estimated(archive, command.estimator)
     if command.kind == "uncertainty":
         from nichechain.plots import plot_evolvability
         from nichechain.plots.maps import plot_uncertainty
@@ -164,13 +164,17 @@ def _draw(command: PlotCommand, archive: Archive, ax: Axes) -> None:
         case "visits":
             plots.plot_visits(archive, ax)
         case "evolvability":
-            scores = _scores(command, archive.chain(command.estimator))
+            scores = _scores(command, progress.estimated(archive, command.estimator))
             plots.plot_evolvability(archive, scores, ax, min_births=command.min_births)
         case "transitions":
-            plots.plot_transitions(archive, archive.chain(command.estimator), ax)
+            chain = progress.estimated(archive, command.estimator)
+            with progress.spinner("drawing"):
+                plots.plot_transitions(archive, chain, ax)
         case "reachability":
             threshold = 0.05 if command.threshold is None else command.threshold
-            plots.plot_reachability(archive, archive.chain(command.estimator), ax, threshold=threshold)
+            chain = progress.estimated(archive, command.estimator)
+            with progress.spinner("drawing"):
+                plots.plot_reachability(archive, chain, ax, threshold=threshold)
         case "reach":
             from nichechain.evolvability.question import DRAWS
             from nichechain.evolvability.reach import reach
@@ -178,7 +182,7 @@ def _draw(command: PlotCommand, archive: Archive, ax: Axes) -> None:
             from nichechain.plots.maps import plot_reach
 
             assert command.niche is not None
-            chain = archive.chain(command.estimator)
+            chain = progress.estimated(archive, command.estimator)
             niche = chain.state(parse_niche(command.niche, "--niche"))
             with progress.adding(1 if chain.posterior is None else DRAWS, "draws of T") as tell:
                 found = reach(chain, niche=niche, l=command.l, lineages=command.lineages, on_done=tell)
@@ -188,12 +192,18 @@ def _draw(command: PlotCommand, archive: Archive, ax: Axes) -> None:
             from nichechain.plots.graphs import plot_wormholes
 
             # Broken children all land at the start, which is no secret passage.
-            plot_wormholes(archive, wormholes(archive.chain(command.estimator), beyond="both"), ax)
+            chain = progress.estimated(archive, command.estimator)
+            with progress.spinner("drawing"):
+                plot_wormholes(archive, wormholes(chain, beyond="both"), ax)
         case "classes":
             from nichechain.plots.classes import plot_classes
 
-            plot_classes(archive, archive.chain("mle"), ax, threshold=command.threshold or 0.0)
+            with progress.spinner("drawing"):
+                plot_classes(archive, archive.chain("mle"), ax, threshold=command.threshold or 0.0)
         case "transitions-by-class":
             from nichechain.plots.classes import plot_transitions_by_class
 
-            plot_transitions_by_class(archive, archive.chain("mle"), ax, threshold=command.threshold or 0.0)
+            with progress.spinner("drawing"):
+                plot_transitions_by_class(
+                    archive, archive.chain("mle"), ax, threshold=command.threshold or 0.0
+                )

@@ -13,7 +13,9 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.progress import Progress, TaskID
 
+    from nichechain.archive.archive import Archive
     from nichechain.archive.filling import BuildProgress
+    from nichechain.chain import NicheChain
 
 # Seconds between progress lines where there is no terminal to redraw.
 _LINE_EVERY = 10.0
@@ -43,6 +45,12 @@ def leave_at_next_interrupt() -> None:
 def spinner(text: str) -> Any:
     """Something that turns while a thing is loaded; nothing where there is no terminal."""
     return _console().status(text)
+
+
+def estimated(archive: Archive, estimator: str = "empirical-bayes", **options: Any) -> NicheChain:
+    """The chain of an archive, while something turns: a million births take a quarter of a minute."""
+    with spinner("estimating T"):
+        return archive.chain(estimator, **options)
 
 
 @contextmanager

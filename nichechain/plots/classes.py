@@ -6,12 +6,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
 
+from nichechain.births.table import NONE
 from nichechain.chain.structure.classes import communicating_classes, recurrent_classes
 from nichechain.core.errors import NichechainError
 from nichechain.core.text import some
 from nichechain.plots.cells import cells_along, fill, hatch
+from nichechain.plots.pixels import SMALLEST, show_entries
 from nichechain.plots.style import EDGE, EMPTY, INK, LONG_JUMP, START, axes_of, behavior_axes, colorbar, key
 
 if TYPE_CHECKING:
@@ -25,7 +26,6 @@ Ints = NDArray[np.int64]
 # The largest classes, in order; colours that differ in lightness as well as in hue.
 _COLORS = (EDGE, START, "#7fb08a", "#8a5a9e", "#5c4433", "#9fd3e6")
 _SINGLE = "#c9a7ad"
-_SMALLEST = 1e-3
 # Width of the borders of niches, over the cells along an axis: borders must not hide what is small.
 _BORDER = 6.0
 
@@ -129,8 +129,6 @@ def plot_transitions_by_class(
         If no birth has a parent or the threshold is out of range.
     """
     ax = axes_of(ax)
-    from matplotlib.colors import LogNorm
-
     counts = archive.counts
     if not counts.births.any():
         raise NichechainError(f"{archive.folder} has no births with a parent: there is no T to draw")
@@ -138,16 +136,8 @@ def plot_transitions_by_class(
     parts = [states[seen[states]] for states in _by_size(chain, threshold)]
     parts = [states for states in parts if states.size]
     order = np.concatenate(parts)
-    dense = sparse.csr_array(chain.T)[order][:, order].toarray()
-    unknown = counts.births[order] == 0
-    dense = np.where(unknown[:, None], 0.0, dense)
-    picture = ax.imshow(
-        np.ma.masked_less(dense, _SMALLEST),
-        norm=LogNorm(_SMALLEST, 1.0),
-        cmap="viridis_r",
-        interpolation="nearest",
-    )
-    ax.set_facecolor("white")
+    known = np.where(counts.births[order] > 0, order, NONE)
+    picture, pixel = show_entries(ax, chain, known, order)
     several = [states for states in parts if states.size > 1]
     ends = np.cumsum([states.size for states in several])
     for end in ends:
@@ -166,9 +156,9 @@ def plot_transitions_by_class(
     ax.set_yticks(ticks, names, fontsize="small", rotation=90, va="center")
     ax.set(xlabel="state of the child", ylabel="state of the parent")
     ax.tick_params(length=2, color=INK)
-    colorbar(ax, picture, f"probability (white: under {_SMALLEST:g}, or no births)")
+    colorbar(ax, picture, f"probability (white: under {SMALLEST:g}, or no births)")
     ax.set_title(f"T by communicating class: {len(several)} of several states, {some(alone, 'state')} alone")
-    key(ax, note=_note(chain, threshold))
+    key(ax, note="; ".join(filter(None, (_note(chain, threshold), pixel))))
     return ax
 
 

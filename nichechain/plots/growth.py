@@ -116,17 +116,17 @@ def plot_lineages(
     return ax
 
 
-def check_growth(chain: NicheChain) -> None:
-    """Refuse chains whose curves would take too long, before anything is computed.
+def check_growth(states: int) -> None:
+    """Refuse chains whose curves would take too long, by their states, before anything is computed.
 
     Raises
     ------
     NichechainError
         If there are more than 4,000 states.
     """
-    if chain.states > _MOST_STATES:
+    if states > _MOST_STATES:
         raise NichechainError(
-            f"the chain has {chain.states} states, but growth is computed in closed form, "
+            f"the chain has {states} states, but growth is computed in closed form, "
             f"for at most {_MOST_STATES}"
         )
 
@@ -135,7 +135,7 @@ def _covered(chain: NicheChain, niches: Sequence[Niche], question: Question, lin
     """Coverage (draws, niches, generations, lineages)."""
     if not 1 <= len(niches) <= len(_COLORS):
         raise NichechainError(f"{len(niches)} niches are given, but one to {len(_COLORS)} can be told apart")
-    check_growth(chain)
+    check_growth(chain.states)
     roots = [chain.state(niche) for niche in niches]
     return np.array(
         [

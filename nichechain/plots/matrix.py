@@ -6,12 +6,12 @@ import textwrap
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import sparse
 
 from nichechain.core.errors import NichechainError
 from nichechain.core.text import some
 from nichechain.niches import GridNiches
 from nichechain.plots.cells import cells_along
+from nichechain.plots.pixels import SMALLEST, show_entries
 from nichechain.plots.style import EMPTY, INK, axes_of, colorbar, plain
 
 if TYPE_CHECKING:
@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     from nichechain.chain import NicheChain
     from nichechain.niches import Niches
 
-# Probabilities below this are left white.
-_SMALLEST = 1e-3
 # Letters of a line of the title.
 _TITLE = 54
 
@@ -49,22 +47,12 @@ def plot_transitions(archive: Archive, chain: NicheChain, ax: Axes | None = None
         If no birth has a parent.
     """
     ax = axes_of(ax)
-    from matplotlib.colors import LogNorm
-
     counts = archive.counts
     rows = _in_order(archive.niches, np.flatnonzero(counts.births))
     columns = _in_order(archive.niches, np.flatnonzero(counts.visits))
     if not rows.size:
         raise NichechainError(f"{archive.folder} has no births with a parent: there is no T to draw")
-    shown = sparse.csr_array(chain.T)[rows][:, columns].toarray()
-    picture = ax.imshow(
-        np.ma.masked_less(shown, _SMALLEST),
-        norm=LogNorm(_SMALLEST, 1.0),
-        cmap="viridis_r",
-        interpolation="nearest",
-        aspect="auto",
-    )
-    ax.set_facecolor("white")
+    picture, pixel = show_entries(ax, chain, rows, columns, aspect="auto")
     ax.xaxis.set_ticks(*_ticks(archive, columns), rotation=90, fontsize="x-small")
     ax.yaxis.set_ticks(*_ticks(archive, rows), fontsize="x-small")
     name, unit = archive.meta.facts.behavior_names[0], archive.meta.facts.unit
@@ -74,12 +62,13 @@ def plot_transitions(archive: Archive, chain: NicheChain, ax: Axes | None = None
     for axis, states in ((ax.axhline, rows), (ax.axvline, columns)):
         for border in np.flatnonzero(np.diff(_first_index(archive, states))):
             axis(border + 0.5, color=EMPTY, linewidth=0.6, zorder=0.5)
-    colorbar(ax, picture, f"probability (white: under {_SMALLEST:g})")
+    colorbar(ax, picture, f"probability (white: under {SMALLEST:g})")
     ax.set_title(
         "\n".join(
             [
                 f"T: {some(rows.size, 'row')} with births, {some(columns.size, 'state')} visited",
                 *textwrap.wrap(chain.estimator, _TITLE),
+                *([pixel] if pixel else []),
             ]
         ),
         fontsize="medium",
