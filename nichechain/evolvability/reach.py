@@ -15,6 +15,7 @@ from nichechain.chain.operator import PooledTransition
 from nichechain.core.intervals import drawn_interval, no_interval
 from nichechain.evolvability.coverage import at_least_once, visit_probabilities
 from nichechain.evolvability.question import DRAWS, Convention, Question, Root
+from nichechain.evolvability.urn_reach import simulated_reach
 from nichechain.niches import Niche
 
 if TYPE_CHECKING:
@@ -133,11 +134,30 @@ def reach(
 
     Notes
     -----
-    The niches that the paper's section "Towards better evolvability definitions" counts.
+    The niches that the paper's section "Towards better evolvability definitions" counts. In closed form up to
+    a thousand states; beyond, lineages are followed as in :mod:`nichechain.evolvability.urn_reach`.
     """
     question = Question(l, lineages, convention, draws=draws, seed=seed)
     root = Root(chain, niche=niche, offspring=offspring)
     n = chain.n_niches
+    if question.by_urns(chain):
+        assert chain.posterior is not None
+        visit, passes, simulated = simulated_reach(
+            chain.posterior, question, root.state, root.distribution, on_done
+        )
+        some_of_all, _, low, high = simulated.summary()
+        return Reach(
+            visit,
+            some_of_all,
+            lineages * passes,
+            np.clip(low, 0.0, 1.0),
+            np.clip(high, 0.0, 1.0),
+            l,
+            lineages,
+            convention,
+            chain.estimator,
+            root.births,
+        )
     visits, descendants = [], []
     some: list[Floats] = []
     own = root.visited(question)
