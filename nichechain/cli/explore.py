@@ -44,10 +44,12 @@ def run(arguments: Sequence[str]) -> int:
     output.check_out(command.out, ())
     check_at_least(0, **{"--seed": command.seed})
     from nichechain.archive.archive import load
-    from nichechain.plots.explorer import draws_of, write_explorer
+    from nichechain.plots.explorer import check_drawable, draws_of, write_explorer
 
     archive = parsing.seen(load(command.path), command.steps)
     other = None if command.beside is None else parsing.seen(load(command.beside), command.steps)
+    for each in filter(None, (archive, other)):
+        check_drawable(each)
     chain = progress.estimated(archive, command.estimator)
     pairs = [(archive, chain)]
     if other is not None:

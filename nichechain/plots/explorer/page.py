@@ -117,13 +117,9 @@ def explorer_page(
         raise NichechainError(f"l is {l}, but the page goes up to {LONGEST} generations")
     if lineages > _MOST_LINEAGES:
         raise NichechainError(f"lineages is {lineages}, but the page goes up to {_MOST_LINEAGES}")
-    axes = len(archive.meta.facts.behavior_names)
-    if axes != 2:
-        raise NichechainError(f"behavior has {axes} axes, but the page is a map over 2")
+    check_drawable(archive)
     if chain.niches != archive.niches:
         raise NichechainError(f"the chain is not over the niches of {archive.folder}")
-    if chain.states > _STATES:
-        raise NichechainError(f"the chain has {chain.states} states, but a page holds at most {_STATES}")
     content = {
         **_facts(archive, chain),
         **_cells(archive),
@@ -209,6 +205,22 @@ def _elites(archive: Archive) -> dict[str, Any]:
         *elites.behavior[inside].T,
     ]
     return {"elites": packed(found, np.float64), "replacement": archive.config.replacement}
+
+
+def check_drawable(archive: Archive) -> None:
+    """Refuse archives that no page can show, before a chain is estimated.
+
+    Raises
+    ------
+    NichechainError
+        If behavior has not two axes, or there are more than 4,000 states.
+    """
+    axes = len(archive.meta.facts.behavior_names)
+    if axes != 2:
+        raise NichechainError(f"behavior has {axes} axes, but the page is a map over 2")
+    states = archive.niches.states
+    if states > _STATES:
+        raise NichechainError(f"the chain has {states} states, but a page holds at most {_STATES}")
 
 
 def draws_of(chain: NicheChain) -> int:
