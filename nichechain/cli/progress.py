@@ -184,6 +184,18 @@ def stages() -> Iterator[Callable[[str, int, int], None]]:
         yield tell
 
 
+def more(tell: Callable[[str, int, int], None], stage: str, total: int) -> Callable[[int], None]:
+    """What tells a stage how many more are done."""
+    done = 0
+
+    def add(number: int) -> None:
+        nonlocal done
+        done += number
+        tell(stage, done, total)
+
+    return add
+
+
 def _bar(shown: Console, *texts: str, named: bool = False) -> Progress:
     """A bar with such columns between how much is done and how long the rest will take."""
     from rich import progress

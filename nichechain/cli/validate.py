@@ -57,9 +57,15 @@ def run(arguments: Sequence[str]) -> int:
         raise NichechainError(f"--out is {str(out)!r}, but that is a file, not a folder")
     with (
         execution.make(command.workers, command.cache_memory) as executor,
-        progress.adding(config.evaluations, "evaluations") as tell,
+        progress.stages() as tell,
     ):
-        result = validate(archive, executor, config, on_done=tell)
+        result = validate(
+            archive,
+            executor,
+            config,
+            on_done=progress.more(tell, "evaluations", config.evaluations),
+            on_permuted=progress.more(tell, "permutations", config.permuted),
+        )
     # Made only now, so that bad input leaves nothing behind.
     out.mkdir(parents=True, exist_ok=True)
     (out / "validation.json").write_text(json.dumps(result.to_json(), indent=2) + "\n", encoding="utf-8")

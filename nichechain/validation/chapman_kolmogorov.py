@@ -16,7 +16,8 @@ from nichechain.births.table import NONE
 from nichechain.core.errors import NichechainError
 from nichechain.core.randomness import Purpose, keyed
 from nichechain.validation.lineages import Triples
-from nichechain.validation.markov import PERMUTATIONS, MarkovTest, check_permutations, p_value
+from nichechain.validation.markov import PERMUTATIONS, MarkovTest, check_permutations, p_value, permuted
+from nichechain.validation.rollouts import OnDone
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -26,7 +27,9 @@ _BIRTHS = 10
 _LINEAGES = 11
 
 
-def births_test(triples: Triples, *, permutations: int = PERMUTATIONS, seed: int = 0) -> MarkovTest:
+def births_test(
+    triples: Triples, *, permutations: int = PERMUTATIONS, seed: int = 0, on_done: OnDone | None = None
+) -> MarkovTest:
     """Children against Σ_j w_ij T_jk for each grandparent state i, on births of a search.
 
     The statistic is the squared distance of counts from expectation, over (i, k), divided by the
@@ -41,6 +44,8 @@ def births_test(triples: Triples, *, permutations: int = PERMUTATIONS, seed: int
     permutations : int
         At least 1.
     seed : int
+    on_done : callable, optional
+        Told how many more permutations are done.
 
     Raises
     ------
@@ -63,13 +68,15 @@ def births_test(triples: Triples, *, permutations: int = PERMUTATIONS, seed: int
     sums = _Sums(niche, place[used.elite], used.child)
     observed = sums.ratio(grandparent)
     rng = keyed(seed, Purpose.PERMUTATION, _BIRTHS)
-    values = np.array(
-        [sums.ratio(grandparent[np.lexsort((rng.random(niche.size), niche))]) for _ in range(permutations)]
+    values = permuted(
+        lambda: sums.ratio(grandparent[np.lexsort((rng.random(niche.size), niche))]), permutations, on_done
     )
     return MarkovTest(name, observed, float(values.mean()), p_value(observed, values), permutations, *facts)
 
 
-def lineages_test(states: Ints, *, permutations: int = PERMUTATIONS, seed: int = 0) -> list[MarkovTest]:
+def lineages_test(
+    states: Ints, *, permutations: int = PERMUTATIONS, seed: int = 0, on_done: OnDone | None = None
+) -> list[MarkovTest]:
     """Generations k = 2, 3, ... of lineages without selection, against T^k.
 
     The statistic is the squared distance, over all starts, of the states k generations on from
@@ -85,6 +92,8 @@ def lineages_test(states: Ints, *, permutations: int = PERMUTATIONS, seed: int =
     permutations : int
         At least 1.
     seed : int
+    on_done : callable, optional
+        Told how many more permutations are done.
 
     Returns
     -------
@@ -119,6 +128,8 @@ def lineages_test(states: Ints, *, permutations: int = PERMUTATIONS, seed: int =
     for number in range(permutations):
         recombined = _recombined(walks, rng)
         values[number] = [table.distance(recombined) for table in tables]
+        if on_done is not None:
+            on_done(1)
     niches, births = _meetings(walks, names)
     alive = states != NONE
     facts = (niches, births, int(np.unique(states[:, 1:-1][alive[:, 1:-1]]).size), int(alive[:, 2:].sum()))

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from nichechain.core.checks import check_at_least
 from nichechain.core.randomness import Purpose, keyed
 from nichechain.validation.lineages import Triples
+from nichechain.validation.rollouts import OnDone
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -71,7 +72,12 @@ class _Test(IntEnum):
 
 
 def lineage_test(
-    triples: Triples, *, depth_bins: int = DEPTH_BINS, permutations: int = PERMUTATIONS, seed: int = 0
+    triples: Triples,
+    *,
+    depth_bins: int = DEPTH_BINS,
+    permutations: int = PERMUTATIONS,
+    seed: int = 0,
+    on_done: OnDone | None = None,
 ) -> MarkovTest:
     """Whether the grandparent's niche tells anything of the child's that the parent's does not.
 
@@ -87,6 +93,8 @@ def lineage_test(
     permutations : int
         At least 1.
     seed : int
+    on_done : callable, optional
+        Told how many more permutations are done.
 
     Raises
     ------
@@ -104,10 +112,13 @@ def lineage_test(
         tables.g2,
         keyed(seed, Purpose.PERMUTATION, _Test.LINEAGE),
         permutations,
+        on_done,
     )
 
 
-def homogeneity_test(triples: Triples, *, permutations: int = PERMUTATIONS, seed: int = 0) -> MarkovTest:
+def homogeneity_test(
+    triples: Triples, *, permutations: int = PERMUTATIONS, seed: int = 0, on_done: OnDone | None = None
+) -> MarkovTest:
     """Whether early parents of a niche breed like late ones.
 
     Pearson's X² of child state against the earlier or later half of a niche's parents, by birth,
@@ -116,7 +127,7 @@ def homogeneity_test(triples: Triples, *, permutations: int = PERMUTATIONS, seed
 
     Parameters
     ----------
-    triples, permutations, seed
+    triples, permutations, seed, on_done
         As in :func:`lineage_test`.
 
     Raises
@@ -136,10 +147,13 @@ def homogeneity_test(triples: Triples, *, permutations: int = PERMUTATIONS, seed
         tables.x2,
         keyed(seed, Purpose.PERMUTATION, _Test.HOMOGENEITY),
         permutations,
+        on_done,
     )
 
 
-def sibling_test(triples: Triples, *, permutations: int = PERMUTATIONS, seed: int = 0) -> MarkovTest:
+def sibling_test(
+    triples: Triples, *, permutations: int = PERMUTATIONS, seed: int = 0, on_done: OnDone | None = None
+) -> MarkovTest:
     """Whether parents of one niche breed alike, whoever they are.
 
     Pearson's X² of child state against parent within the parent's niche; children are permuted.
@@ -148,7 +162,7 @@ def sibling_test(triples: Triples, *, permutations: int = PERMUTATIONS, seed: in
 
     Parameters
     ----------
-    triples, permutations, seed
+    triples, permutations, seed, on_done
         As in :func:`lineage_test`.
 
     Raises
@@ -169,6 +183,7 @@ def sibling_test(triples: Triples, *, permutations: int = PERMUTATIONS, seed: in
         tables.x2,
         keyed(seed, Purpose.PERMUTATION, _Test.SIBLINGS),
         permutations,
+        on_done,
     )
 
 
@@ -256,6 +271,7 @@ def _permuted(
     statistic: Callable[[Ints], float],
     rng: np.random.Generator,
     permutations: int,
+    on_done: OnDone | None,
 ) -> MarkovTest:
     """The test of a statistic of labels."""
     check_permutations(permutations)
@@ -263,8 +279,18 @@ def _permuted(
     if not tables.births:
         return MarkovTest(name, 0.0, 0.0, 1.0, permutations, *facts)
     observed = statistic(tables.labels)
-    values = np.array([statistic(tables.shuffled(rng)) for _ in range(permutations)])
+    values = permuted(lambda: statistic(tables.shuffled(rng)), permutations, on_done)
     return MarkovTest(name, observed, float(values.mean()), p_value(observed, values), permutations, *facts)
+
+
+def permuted(statistic: Callable[[], float], permutations: int, on_done: OnDone | None) -> Floats:
+    """The statistic under each permutation, (permutations,)."""
+    values = np.empty(permutations)
+    for number in range(permutations):
+        values[number] = statistic()
+        if on_done is not None:
+            on_done(1)
+    return values
 
 
 def p_value(observed: float, permuted: Floats) -> float:

@@ -69,6 +69,11 @@ class ValidationConfig:
         """Genotypes to evaluate, unless a lineage ends before its time."""
         return self.elites * (self.lineages * self.l + self.offspring)
 
+    @property
+    def permuted(self) -> int:
+        """Permutations of all tests, unless there is nothing to permute."""
+        return (4 + (self.l > 1)) * self.permutations
+
 
 @dataclass(frozen=True)
 class Validation:
@@ -111,6 +116,7 @@ def validate(
     config: ValidationConfig | None = None,
     *,
     on_done: OnDone | None = None,
+    on_permuted: OnDone | None = None,
 ) -> Validation:
     """Test whether births are a chain's, and check the chain's predictions on real lineages.
 
@@ -122,6 +128,8 @@ def validate(
     config : ValidationConfig, optional
     on_done : callable, optional
         Told how many more genotypes have been evaluated.
+    on_permuted : callable, optional
+        Told how many more permutations are done.
 
     Returns
     -------
@@ -154,12 +162,12 @@ def validate(
     )
     triples = Triples.from_births(archive.births())
     tests = [
-        test(triples, permutations=config.permutations, seed=config.seed)
+        test(triples, permutations=config.permutations, seed=config.seed, on_done=on_permuted)
         for test in (lineage_test, homogeneity_test, sibling_test, chapman_kolmogorov.births_test)
     ]
     if config.l > 1:
         tests += chapman_kolmogorov.lineages_test(
-            lineages.walks, permutations=config.permutations, seed=config.seed
+            lineages.walks, permutations=config.permutations, seed=config.seed, on_done=on_permuted
         )
     direct = compare(chain, lineages, archive.niches, seed=config.seed)
     return Validation(config, archive.meta.births, tuple(tests), direct)

@@ -232,3 +232,10 @@ def test_forty_thousand_births_are_joined_and_tested():
     triples = simulated(nc.NicheChain(matrix), 40_000, 0)
     assert len(triples) == 39_999
     assert births_test(triples, permutations=9).all_niches == 240
+
+
+def test_each_permutation_is_told(triples):
+    for name, test in TESTS.items():
+        told = []
+        assert test(triples, permutations=7, on_done=told.append) == test(triples, permutations=7), name
+        assert told == [1] * 7
