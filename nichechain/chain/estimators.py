@@ -18,6 +18,7 @@ from nichechain.chain.posterior import DirichletPosterior
 from nichechain.chain.prior import fit_prior
 from nichechain.core.checks import check_choice, check_positive, shown
 from nichechain.core.errors import NichechainError
+from nichechain.core.text import rounded
 
 Floats = NDArray[np.float64]
 
@@ -147,7 +148,7 @@ def _dirichlet(counts: TransitionCounts, strength: float | str) -> NicheChain:
         size = _positive(strength)
     base = BaseMeasure.pooled(counts, np.array([0.0, 0.0, 1.0]))
     posterior = DirichletPosterior(counts, base, size, np.ones(states))
-    return with_posterior(counts, posterior, f"dirichlet, uniform base, strength {size:.3g}")
+    return with_posterior(counts, posterior, f"dirichlet, uniform base, strength {rounded(size)}")
 
 
 def _empirical_bayes(counts: TransitionCounts, strength: float | None) -> NicheChain:
@@ -162,7 +163,7 @@ def _empirical_bayes(counts: TransitionCounts, strength: float | None) -> NicheC
     checked = (
         "" if law is None else f", calibrated on lineages of {law.broods} elite{'s' * (law.broods != 1)}"
     )
-    name = f"empirical-bayes, strength {prior.strength:.3g}{related}{checked}"
+    name = f"empirical-bayes, strength {rounded(prior.strength)}{related}{checked}"
     return with_posterior(counts, posterior, name)
 
 

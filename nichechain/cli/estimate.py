@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from nichechain.cli import output, parsing, progress
 from nichechain.core.checks import check_at_least
 from nichechain.core.errors import NichechainError
+from nichechain.core.text import rounded
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -120,7 +121,7 @@ def _estimate(command: EstimateCommand, archive: Archive) -> None:
         }
         if posterior is not None:
             rows |= {
-                "strength of the base": f"{posterior.strength:.3g} births",
+                "strength of the base": f"{rounded(posterior.strength)} births",
                 "  what neighbours say": f"{neighbours:.1%}",
                 "  where children land": f"{(1.0 - neighbours) * destination:.1%}",
                 "  how far they land": f"{(1.0 - neighbours) * displacement:.1%}",
@@ -205,6 +206,7 @@ def _stability(command: EstimateCommand, archive: Archive) -> None:
         f"[bold]Ranking of {found.niches} niches[/] by {found.l}-evolvability, thinned births against all: "
         "Spearman's correlation"
     )
+    shown.print(f"[dim]level: the mean {found.l}-evolvability of these niches, by the births of each line[/]")
     table = output.table("part", "births", "mean", "lowest", "highest", "level")
     for row in found.to_frame().itertuples():
         values = (f"{value:.2f}" for value in (row.spearman, row.lowest, row.highest))

@@ -28,6 +28,12 @@ def printable_values(values: Any) -> Any:
             return values
 
 
+def rounded(value: float) -> str:
+    """A number with three digits that count, and no power of ten where it is large: ``8,120``."""
+    shown = f"{value:.3g}"
+    return f"{float(shown):,.0f}" if "e+" in shown else shown
+
+
 def some(number: int, one: str, more: str | None = None) -> str:
     """A number of things: ``1 niche``, ``2 niches``.
 

@@ -23,6 +23,7 @@ from nichechain.core.arrays import entries_at
 from nichechain.core.checks import check_at_least
 from nichechain.core.errors import NichechainError
 from nichechain.core.randomness import Purpose, keyed
+from nichechain.core.text import rounded
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -185,7 +186,7 @@ def marginal_likelihood_fit(counts: TransitionCounts) -> NicheChain:
         niches=counts.niches,
         outside=outside,
         counts=counts,
-        estimator=f"marginal likelihood of all births, strength {strength:.3g}",
+        estimator=f"marginal likelihood of all births, strength {rounded(strength)}",
     )
 
 
