@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     import pandas as pd
 
 _SHOWN = 20
+# What single births decide where there are few.
+_OF_FEW_BIRTHS = ("evolvability", "entered")
 
 
 @dataclass(frozen=True)
@@ -37,6 +39,8 @@ class TableCommand:
         "expected-ratio",
     ] = "evolvability"
     """What to sort by, the largest first; niche is the order of niches."""
+    min_births: int = 20
+    """By evolvability or entered, niches with fewer births of parents there are not ranked and come last."""
     top: Annotated[int | None, parsing.option("INT", f"{_SHOWN} in a table, else all")] = None
     """So many rows."""
     l: int = 5
@@ -61,7 +65,7 @@ def run(arguments: Sequence[str]) -> int:
     command = parsing.parse(TableCommand, arguments)
     if command.top is not None:
         check_at_least(1, **{"--top": command.top})
-    check_at_least(0, **{"--seed": command.seed})
+    check_at_least(0, **{"--seed": command.seed, "--min-births": command.min_births})
     check_at_least(1, **{"--draws": command.draws})
     check_at_least(2, **{"--children": command.children})
     from nichechain.archive.archive import load
@@ -82,8 +86,7 @@ def run(arguments: Sequence[str]) -> int:
             seed=command.seed,
             on_done=tell,
         )
-    column = command.by.replace("-", "_")
-    frame = frame.sort_values(column, ascending=command.by == "niche", kind="stable")
+    frame, last = _sorted(frame, command)
     known = len(frame)
     frame = frame.head(command.top or (_SHOWN if command.format == "table" else known))
     if command.format == "csv":
@@ -91,11 +94,25 @@ def run(arguments: Sequence[str]) -> int:
     elif command.format == "json":
         print(json.dumps(output.records(frame), indent=2))
     else:
-        _show(frame, command, known)
+        _show(frame, command, known, last)
     return 0
 
 
-def _show(frame: pd.DataFrame, command: TableCommand, known: int) -> None:
+def _sorted(frame: pd.DataFrame, command: TableCommand) -> tuple[pd.DataFrame, int]:
+    """The rows in order, and how many of them come last for want of births."""
+    import pandas as pd
+
+    column = command.by.replace("-", "_")
+    frame = frame.sort_values(column, ascending=command.by == "niche", kind="stable")
+    if command.by not in _OF_FEW_BIRTHS:
+        return frame, 0
+    few = frame["births"] < command.min_births
+    # Among themselves in the order of niches, which claims nothing.
+    rest = frame[few].sort_values("niche")
+    return pd.concat([frame[~few], rest]), len(rest)
+
+
+def _show(frame: pd.DataFrame, command: TableCommand, known: int, last: int) -> None:
     import pandas as pd
 
     shown = output.console()
@@ -122,6 +139,7 @@ def _show(frame: pd.DataFrame, command: TableCommand, known: int) -> None:
             "" if row.low == row.high else f"{row.low:.1f} to {row.high:.1f}",
             _number(both, "d"),
             ("* " if flagged else "") + _number(row.expected_ratio, ".2f"),
+            style="dim" if row.births < command.min_births and last else None,
         )
     shown.print(table)
     shown.print(
@@ -130,6 +148,11 @@ def _show(frame: pd.DataFrame, command: TableCommand, known: int) -> None:
         f"how far they are from it; at least {command.children} children are needed, and * marks dissimila.\n"
         "--format csv writes all niches."
     )
+    if last:
+        shown.print(
+            f"{some(last, 'niche')} with fewer than {command.min_births} births of parents there "
+            f"{'is not ranked and comes' if last == 1 else 'are not ranked and come'} last (--min-births)."
+        )
 
 
 def _number(value: object, how: str) -> str:

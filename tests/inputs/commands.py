@@ -289,6 +289,7 @@ TABLE: tuple[tuple[str, str, tuple[str, ...], Bad], ...] = (
             "path": PATH,
             "steps": STEPS,
             "by": UNKNOWN,
+            "min_births": NATURAL,
             "top": COUNT,
             "children": ("1", *COUNT),
             "draws": COUNT,
