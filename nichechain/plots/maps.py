@@ -11,7 +11,7 @@ from nichechain.core.checks import check_whole
 from nichechain.core.errors import NichechainError
 from nichechain.core.text import some
 from nichechain.plots.cells import fill, frame, hatch
-from nichechain.plots.style import EMPTY, INK, axes_of, behavior_axes, colorbar, key, on_map
+from nichechain.plots.style import EMPTY, INK, axes_of, behavior_axes, colorbar, key, on_map, without_outliers
 from nichechain.search.config import WHO_IS_ELITE
 
 if TYPE_CHECKING:
@@ -39,18 +39,33 @@ def plot_elites(archive: Archive, ax: Axes | None = None) -> Axes:
     Returns
     -------
     matplotlib.axes.Axes
+
+    Raises
+    ------
+    NichechainError
+        If the archive has no elites, as that of a log, or behavior has more than two axes.
+
+    Notes
+    -----
+    Colours span the objectives without outliers, those further from the quartiles than three times the
+    distance between these (Tukey, "Exploratory Data Analysis", 1977). The colour bar says how many there are.
     """
     ax = axes_of(ax)
+    from matplotlib.colors import Normalize
     from matplotlib.lines import Line2D
 
     elites = archive.elites
+    if not len(elites):
+        why = ": births of a log were imported" if archive.meta.imported else ""
+        raise NichechainError(f"{archive.folder} has no elites to draw{why}")
     inside = elites.niche < len(archive.niches)
     values = np.full(len(archive.niches), np.nan)
     values[elites.niche[inside]] = elites.objective[inside]
-    mesh = _map(ax, archive, values, "viridis")
+    low, high = without_outliers(values)
+    mesh = _map(ax, archive, values, "viridis", Normalize(low, high))
     x, y = on_map(elites.behavior[inside])
     ax.plot(x, y, ".", color="white", markersize=3, markeredgecolor="none", alpha=0.9)
-    colorbar(ax, mesh, archive.meta.facts.objective_name)
+    colorbar(ax, mesh, archive.meta.facts.objective_name, values)
     ax.set_title(f"Elites: {archive.filled} of {len(archive.niches)} niches filled")
     handle = Line2D([], [], marker=".", linestyle="none", color="#777777", label="behavior of an elite")
     key(ax, handle, note=f"elites: {WHO_IS_ELITE[archive.config.replacement]} of each niche")

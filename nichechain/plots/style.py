@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from nichechain.core.errors import NichechainError
+from nichechain.core.text import rounded
 from nichechain.niches import GridNiches
 
 if TYPE_CHECKING:
@@ -34,7 +35,8 @@ INK = "#333333"
 _NAMES = "#777777"
 # Letters of a line under a map.
 _NOTE = 62
-
+# An outlier is further from the quartiles than so many times the distance between these.
+_FAR = 3.0
 
 # Height of a strip that shows one axis of behavior, over its width.
 _STRIP = 0.18
@@ -133,13 +135,47 @@ def on_map(behavior: ArrayLike) -> tuple[Floats, Floats]:
     return (places[0], places[1]) if len(places) > 1 else (places[0], np.full_like(places[0], 0.5))
 
 
-def colorbar(ax: Axes, mappable: ScalarMappable, label: str) -> None:
-    """A colour bar as high as the map."""
+def without_outliers(values: Floats) -> tuple[float | None, float | None]:
+    """Smallest and largest of values (n,) that are no outliers; NaN is left out, and None is of no values."""
+    known = values[np.isfinite(values)]
+    if not known.size:
+        return None, None
+    lower, upper = np.quantile(known, (0.25, 0.75))
+    # Where half of the values are one and the same, all others would be outliers.
+    far = _FAR * (upper - lower) or np.inf
+    near = known[(known >= lower - far) & (known <= upper + far)]
+    return float(near.min()), float(near.max())
+
+
+def colorbar(ax: Axes, mappable: ScalarMappable, label: str, values: Floats | None = None) -> None:
+    """A colour bar as high as the map.
+
+    Parameters
+    ----------
+    ax : matplotlib.axes.Axes
+    mappable : matplotlib.cm.ScalarMappable
+    label : str
+    values : (n,) array, optional
+        Those that are drawn: if some are beyond the ends of the bar, it says so.
+    """
     figure = ax.get_figure()
     assert figure is not None
-    bar = figure.colorbar(mappable, cax=ax.inset_axes((1.11, 0.0, 0.045, 1.0)))
-    bar.set_label(plain(label))
+    beyond = {} if values is None else _beyond(mappable, values)
+    ends = {(): "neither", ("min",): "min", ("max",): "max"}.get(tuple(beyond), "both")
+    bar = figure.colorbar(mappable, cax=ax.inset_axes((1.11, 0.0, 0.045, 1.0)), extend=ends)
+    bar.set_label(plain("\n".join([label, *(["; ".join(beyond.values())] if beyond else [])])))
     bar.outline.set_visible(False)
+
+
+def _beyond(mappable: ScalarMappable, values: Floats) -> dict[str, str]:
+    """What lies beyond the ends of a colour bar, by the end."""
+    low, high = mappable.get_clim()
+    said = {}
+    if (below := values[values < low]).size:
+        said["min"] = f"{below.size} lower, down to {rounded(below.min())}"
+    if (above := values[values > high]).size:
+        said["max"] = f"{above.size} higher, up to {rounded(above.max())}"
+    return said
 
 
 def key(ax: Axes, *handles: Any, note: str | None = None) -> None:

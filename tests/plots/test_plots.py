@@ -1,14 +1,18 @@
 import copy
 import io
+from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 from matplotlib.figure import Figure
 
 import nichechain as nc
 from nichechain import plots
+from nichechain.archive import import_births
 from nichechain.core.errors import NichechainError
-from nichechain.plots.style import LONG_JUMP, behavior_axes, plain
+from nichechain.niches import GridNiches
+from nichechain.plots.style import LONG_JUMP, behavior_axes, plain, without_outliers
 
 
 @pytest.fixture(scope="module")
@@ -51,6 +55,34 @@ def test_elites_shows_objectives_and_behaviors(archive, ax):
     elite = archive.elite(int(archive.elites.niche[3]))
     assert values[elite.niche] == elite.objective
     assert np.ma.count(values) == archive.filled
+
+
+def test_colors_leave_out_objectives_that_are_far_from_all_others(archive, ax, monkeypatch):
+    objective = np.linspace(-1.0, 1.0, len(archive.elites))
+    objective[[2, 5]] = 1e4, 2e4
+    monkeypatch.setattr(archive, "elites", replace(archive.elites, objective=objective))
+    plots.plot_elites(archive, ax)
+    assert ax.collections[0].get_clim() == (-1.0, 1.0)
+    labels = [child.get_ylabel() for child in ax.child_axes]
+    assert any(label.endswith("\n2 higher, up to 20,000") for label in labels)
+
+
+def test_values_without_outliers():
+    rng = np.random.default_rng(0)
+    values = rng.uniform(2.0, 3.0, 100)
+    ends = values.min(), values.max()
+    assert without_outliers(values) == ends
+    assert without_outliers(np.concatenate([values, [-90.0, 40.0, np.nan, np.inf]])) == ends
+    # Of two values the rare one is no outlier.
+    assert without_outliers(np.array([0.0] * 9 + [1.0])) == (0.0, 1.0)
+    assert without_outliers(np.full(3, np.nan)) == (None, None)
+
+
+def test_a_log_has_no_elites_to_draw(tmp_path, ax):
+    frame = pd.DataFrame({"parent_niche": [0, 0], "child_niche": [1, 2]})
+    import_births(frame, tmp_path / "log", GridNiches((2, 2), ((0, 1), (0, 1))))
+    with pytest.raises(NichechainError, match="log has no elites to draw: births of a log were imported"):
+        plots.plot_elites(nc.load(tmp_path / "log"), ax)
 
 
 def test_evolvability_leaves_out_niches_without_births(archive, ax):
