@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from nichechain.cli import output, parsing
+from nichechain.core.text import some
 
 
 @dataclass(frozen=True)
@@ -84,8 +85,7 @@ def run(arguments: Sequence[str]) -> int:
         "  never filled": str(content["niches_never_filled"]),
         "  filled, never a parent": str(content["niches_filled_never_parent"]),
         "rows of T observed": str(content["rows_of_T_observed"]),
-        "deepest elite": f"{content['deepest_elite']} generations",
-        "genotype": f"{content['genotype_length']} parameters",
+        **_elites(content, elites=len(archive.elites)),
         **output.physics(saved),
         "on disk": f"{size / 1e6:.1f} MB",
     }
@@ -103,6 +103,16 @@ def run(arguments: Sequence[str]) -> int:
     shown.print("\n[bold]Versions[/]")
     shown.print(output.facts(meta.versions))
     return 0
+
+
+def _elites(content: dict[str, Any], elites: int) -> dict[str, str]:
+    """Rows on elites; a log may bring none, or none with a genotype."""
+    if not elites:
+        return {}
+    rows = {"deepest elite": some(content["deepest_elite"], "generation")}
+    if content["genotype_length"]:
+        rows["genotype"] = some(content["genotype_length"], "parameter")
+    return rows
 
 
 def _origin(origin: dict[str, Any]) -> dict[str, Any]:

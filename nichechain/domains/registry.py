@@ -7,12 +7,13 @@ the domain's, and it points to something that is called with ``seed`` and the do
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any
 
 from nichechain.core.checks import DomainOption, check_text, shown
 from nichechain.core.errors import NichechainError
+from nichechain.core.suggestions import did_you_mean
 from nichechain.domains.arm import PlanarArm
 from nichechain.domains.base import Domain
 from nichechain.domains.fetch import FetchPickAndPlace, FetchPush, FetchReach, FetchSlide
@@ -103,6 +104,14 @@ def _entry_points() -> dict[str, EntryPoint]:
     return {point.name: point for point in entry_points(group=GROUP)}
 
 
+def _nearby(name: str) -> Iterator[str]:
+    """Names that another spelling may have meant."""
+    yield from names()
+    start, colon, env_id = name.partition(":")
+    if colon and start.lower() + colon == PREFIX:
+        yield PREFIX + env_id
+
+
 def _factory(name: str) -> Callable[..., Domain]:
     check_text(domain=name)
     if name in _BUILT_IN:
@@ -114,6 +123,7 @@ def _factory(name: str) -> Callable[..., Domain]:
     if name not in points:
         raise NichechainError(
             f"domain is {shown(name)}, but must be one of {', '.join(names())}, or {PREFIX}ENV_ID"
+            f"{did_you_mean(name, _nearby(name))}"
         )
     try:
         factory: Callable[..., Domain] = points[name].load()

@@ -54,6 +54,9 @@ def test_imported_archive_opens_without_a_domain(built, log, tmp_path, capsys):
     told = capsys.readouterr().out
     assert "1500 (imported)" in told
     assert "log.csv" in told
+    # A log has neither elites nor genotypes.
+    assert "0 parameters" not in told
+    assert "deepest elite" not in told
     # Nothing is known of how children were made.
     assert "cauchy" not in told
     assert main(["info", str(out), "--format", "json"]) == 0

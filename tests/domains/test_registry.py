@@ -89,6 +89,8 @@ def test_an_archive_of_another_packages_domain(tmp_path):
     ("name", "options", "message"),
     [
         ("ant", {}, "domain is 'ant', but must be one of arm, broken, catapult, .* or gym:ENV_ID"),
+        ("Arm", {}, "domain is 'Arm', .* or gym:ENV_ID; did you mean arm?"),
+        ("Gym:Swimmer-v5", {}, "did you mean gym:Swimmer-v5?"),
         ("broken", {}, "domain broken cannot be imported from no_such_package:Domain"),
         ("catapult", {"joints": 3}, "catapult has no option 'joints': it has weight, noise, repeats"),
         ("arm", {"joints": 0}, "joints is 0"),
