@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar
 
 import tyro
 
-from nichechain.cli import output, parsing, progress
+from nichechain.cli import output, parsing, progress, workers
 from nichechain.core.checks import DomainOption, StepBound, shown
 from nichechain.core.errors import NichechainError
 from nichechain.search.config import MOST_FAILED, BuildConfig, ObjectiveName, SearchConfig
@@ -217,12 +217,12 @@ def run(arguments: Sequence[str]) -> int:
     if command.resume and not any(read.is_archive(search.folder) for search in searches):
         # Perhaps the name of the folder was misspelled.
         shown.print(f"{searches[0].folder} holds no archive to go on with: one is begun.")
-    with execution.make(command.workers, command.cache_memory) as executor:
+    with workers.hired(command.workers, command.cache_memory) as executor:
         for folder in (search.folder for search in searches if command.force):
             if folder.exists():
                 with writing(folder):
                     write.clear(folder)
-        with progress.spinner("loading the simulator; its engine is compiled once, in about 20 s"):
+        with progress.spinner("loading the domain"):
             import ribs.archives  # noqa: F401  # takes seconds, which the bar should not count
 
             first = searches[0]

@@ -84,7 +84,7 @@ def report(folder: Path, shown: Console) -> None:
     else:
         shown.print(f"\nNo niche has {_RANKED} births behind its row yet: too few to rank.")
     shown.print("Next:")
-    best = f" --niche {ranking['index'].iloc[0]}" if len(ranking) else ""
+    best = f" --niche {ranking['index'].iloc[0]}" if len(ranking) else "" if roots.size else " --min-births 1"
     path = shlex.quote(str(folder))
     for line in (
         f"nichechain evolvability {path}{best}",

@@ -9,7 +9,7 @@ from typing import Annotated
 
 import tyro
 
-from nichechain.cli import output, parsing, progress
+from nichechain.cli import output, parsing, progress, workers
 from nichechain.core.errors import NichechainError
 from nichechain.search.config import BROOD, MOST_FAILED
 
@@ -39,7 +39,6 @@ class CalibrateCommand:
 def run(arguments: Sequence[str]) -> int:
     """Calibrate, then say what came of it."""
     command = parsing.parse(CalibrateCommand, arguments)
-    from nichechain import execution
     from nichechain.archive import read
     from nichechain.archive.archive import load, shipped
 
@@ -60,7 +59,7 @@ def run(arguments: Sequence[str]) -> int:
     end = before.births + (command.rollouts or 0)
     if command.resume and before.calibrations:
         end = before.calibrations[-1].end
-    with execution.make(command.workers, command.cache_memory) as executor:
+    with workers.hired(command.workers, command.cache_memory) as executor:
         try:
             with progress.build_progress(end) as tell:
                 calibrate(

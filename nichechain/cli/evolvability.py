@@ -8,7 +8,7 @@ from contextlib import AbstractContextManager
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from nichechain.cli import meta, output, parsing, progress
+from nichechain.cli import meta, output, parsing, progress, workers
 from nichechain.core.checks import check_at_least
 from nichechain.core.errors import NichechainError
 from nichechain.core.text import some
@@ -153,7 +153,6 @@ def _one(command: EvolvabilityCommand, archive: Archive, chain: NicheChain) -> p
     """One row, for a niche or the genotype of its elite."""
     import pandas as pd
 
-    from nichechain import execution
     from nichechain.evolvability import genotype_evolvability
     from nichechain.evolvability.niches import answer
     from nichechain.evolvability.question import Question, Root
@@ -169,7 +168,7 @@ def _one(command: EvolvabilityCommand, archive: Archive, chain: NicheChain) -> p
         elite = archive.elite(parse_niche(command.elite, "--elite"))
         state = elite.state
         with (
-            execution.make(command.workers, command.cache_memory) as executor,
+            workers.hired(command.workers, command.cache_memory) as executor,
             _drawing(command, chain) as tell,
         ):
             result = genotype_evolvability(

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from nichechain.cli import output, parsing, progress
+from nichechain.cli import output, parsing, progress, workers
 from nichechain.core.checks import check_at_least
 from nichechain.core.errors import NichechainError
 from nichechain.search.config import BuildConfig, MutationName
@@ -72,7 +72,6 @@ class LandscapeCommand:
 def run(arguments: Sequence[str]) -> int:
     """Measure, write, and say what came of it."""
     command = parsing.parse(LandscapeCommand, arguments)
-    from nichechain import execution
     from nichechain.archive.archive import load
     from nichechain.evolvability.question import Question
     from nichechain.landscape import find_measure, find_measures, measure_archive
@@ -105,7 +104,7 @@ def run(arguments: Sequence[str]) -> int:
     measured = len(archive.elites) if command.elites is None else min(command.elites, len(archive.elites))
     total = measured * (1 + command.offspring)
     shown = output.console()
-    with execution.make(command.workers, command.cache_memory) as executor:
+    with workers.hired(command.workers, command.cache_memory) as executor:
         try:
             with progress.adding(total, "evaluations") as tell:
                 found = measure_archive(

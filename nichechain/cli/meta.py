@@ -6,7 +6,7 @@ import json
 from dataclasses import asdict
 from typing import TYPE_CHECKING
 
-from nichechain.cli import output, progress
+from nichechain.cli import output, progress, workers
 from nichechain.core.checks import check_at_least
 from nichechain.core.errors import NichechainError
 
@@ -42,7 +42,6 @@ def show(command: EvolvabilityCommand, archive: Archive) -> int:
     """Measure, and write what came of it."""
     import pandas as pd
 
-    from nichechain import execution
     from nichechain.evolvability import meta_evolvability
     from nichechain.niches import parse_niche
 
@@ -52,7 +51,7 @@ def show(command: EvolvabilityCommand, archive: Archive) -> int:
     offspring = _OFFSPRING if command.offspring is None else command.offspring
     evaluations = max(1, command.meta * (1 + offspring))
     with (
-        execution.make(command.workers, command.cache_memory) as executor,
+        workers.hired(command.workers, command.cache_memory) as executor,
         progress.adding(evaluations, "evaluations") as tell,
     ):
         found = meta_evolvability(

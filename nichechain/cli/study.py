@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
-from nichechain.cli import output, parsing, progress
+from nichechain.cli import output, parsing, progress, workers
 from nichechain.cli.begun import ReportCommand, ResumeCommand, stopped
 from nichechain.cli.build import BuildCommand
 from nichechain.core.errors import NichechainError
@@ -110,7 +110,7 @@ def _search(study: SelectionStudy, folder: Path, command: SelectionCommand | Res
     from nichechain.search.making import make_domain
     from nichechain.studies.searches.running import run_searches
 
-    with execution.make(command.workers, command.cache_memory) as executor:
+    with workers.hired(command.workers, command.cache_memory) as executor:
         with progress.spinner("loading the domain"):
             import ribs.archives  # noqa: F401  # takes seconds, which the bar should not count
 

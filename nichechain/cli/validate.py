@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from nichechain.cli import output, parsing, progress
+from nichechain.cli import output, parsing, progress, workers
 from nichechain.core.errors import NichechainError
 from nichechain.core.text import some
 
@@ -40,7 +40,6 @@ class ValidateCommand:
 def run(arguments: Sequence[str]) -> int:
     """Validate."""
     command = parsing.parse(ValidateCommand, arguments)
-    from nichechain import execution
     from nichechain.archive.archive import load
     from nichechain.validation import ValidationConfig, validate
 
@@ -56,7 +55,7 @@ def run(arguments: Sequence[str]) -> int:
     if out.exists() and not out.is_dir():
         raise NichechainError(f"--out is {str(out)!r}, but that is a file, not a folder")
     with (
-        execution.make(command.workers, command.cache_memory) as executor,
+        workers.hired(command.workers, command.cache_memory) as executor,
         progress.stages() as tell,
     ):
         result = validate(

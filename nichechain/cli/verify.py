@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from nichechain.cli import output, parsing, progress
+from nichechain.cli import output, parsing, progress, workers
 from nichechain.core.checks import shown
 from nichechain.core.errors import NichechainError
 
@@ -52,14 +52,13 @@ class VerifyCommand:
 def run(arguments: Sequence[str]) -> int:
     """Verify."""
     command = parsing.parse(VerifyCommand, arguments)
-    from nichechain import execution
     from nichechain.archive.archive import load
     from nichechain.verification import verify
 
     sample = _sample(command.sample)
     archive = load(command.path)
     began = time.monotonic()
-    with execution.make(command.workers, command.cache_memory) as executor, progress.stages() as tell:
+    with workers.hired(command.workers, command.cache_memory) as executor, progress.stages() as tell:
         result = verify(
             archive,
             sample=sample,

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 import tyro
 
-from nichechain.cli import output, parsing, progress
+from nichechain.cli import output, parsing, progress, workers
 from nichechain.cli.begun import ReportCommand, ResumeCommand, stopped
 from nichechain.core.checks import shown
 from nichechain.core.errors import NichechainError
@@ -231,10 +231,9 @@ def _resume(command: ResumeCommand) -> int:
 
 
 def _walk(study: Study, domain: Domain, folder: Path, command: _Walks | ResumeCommand) -> int:
-    from nichechain import execution
     from nichechain.studies.running import run as walk_study
 
-    with execution.make(command.workers, command.cache_memory) as executor:
+    with workers.hired(command.workers, command.cache_memory) as executor:
         with progress.spinner("loading the domain"):
             domain.evaluate(domain.sample(1, seed=0))
         try:

@@ -39,6 +39,15 @@ def test_build_reports_what_came_of_it(tmp_path, capsys):
     assert f"{best['value']:.1f}" in shown
 
 
+def test_what_comes_next_runs_where_births_are_few(tmp_path, capsys):
+    folder = tmp_path / "arm"
+    assert main(build(folder, 120)) == 0
+    shown = capsys.readouterr().out
+    assert "too few to rank" in shown
+    (line,) = [line for line in shown.splitlines() if "nichechain evolvability" in line]
+    assert main(line.split()[1:]) == 0
+
+
 def test_an_archive_is_not_overwritten_unless_asked(tmp_path, capsys):
     folder = tmp_path / "arm"
     main(build(folder, 200))
