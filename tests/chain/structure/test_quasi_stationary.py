@@ -97,6 +97,7 @@ def test_a_set_that_is_hardly_ever_left():
 
 @given(graded(5))
 @example(np.array([[0.5, 0.5, 5e-14], [0.5 - 2.5e-9, 0.5 - 2.5e-9, 5e-9], [1 / 3, 1 / 3, 1 / 3]]))
+@example(np.array([[0.5, 5e-28, 0.5], [0.4999975, 5e-6, 0.4999975], [1 / 3, 1 / 3, 1 / 3]]))
 @settings(max_examples=40, deadline=None)
 def test_laws_of_staying(transition):
     size = len(transition)
