@@ -108,7 +108,7 @@ class BaseMeasure:
         return np.stack(
             [
                 self.destination[child],
-                self._displaced(parent, child),
+                self.displaced(parent, child),
                 np.full(child.size, 1.0 / self.niches.states),
             ]
         )
@@ -162,7 +162,8 @@ class BaseMeasure:
             child[told] = self.near.sample(flat[told], rng)
         return child.reshape(parent.shape)
 
-    def _displaced(self, parent: Ints, child: Ints) -> Floats:
+    def displaced(self, parent: Ints, child: Ints) -> Floats:
+        """Probability of each pair under displacement, (N,): destination's where the parent is outside."""
         n = len(self.niches)
         # A parent outside has no cell to be displaced from; neither has a child outside.
         result = np.where(parent < n, np.where(child < n, 0.0, self.leaving), self.destination[child])

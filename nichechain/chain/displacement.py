@@ -15,6 +15,10 @@ from nichechain.niches import GridNiches
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+Flags = NDArray[np.bool_]
+
+# Children drawn anew that landed nowhere known; those that are left then are drawn from whole rows.
+_PATIENCE = 100
 
 
 class Displacement(Protocol):
@@ -60,17 +64,20 @@ class Displacement(Protocol):
 
 @dataclass(frozen=True)
 class GridDisplacement:
-    """On a grid: the share of births with each displacement, in cells.
+    """On a grid: the share of births with each displacement, in cells, to where anybody was born.
 
     Parameters
     ----------
     niches : GridNiches
     kernel : float64 array of shape (2 k - 1, ...) for k cells along an axis
         Share of each displacement among births inside of parents inside.
+    known : (n,) bool array
+        Niches that children are displaced to. To others only a child that stays is.
     """
 
     niches: GridNiches
     kernel: Floats
+    known: Flags
 
     @classmethod
     def pooled(cls, niches: GridNiches, parent: Ints, child: Ints, count: Ints | Floats) -> GridDisplacement:
@@ -79,19 +86,28 @@ class GridDisplacement:
         np.add.at(kernel, _cells_apart(niches, parent, child), count)
         # Half a birth at no distance keeps the kernel usable from every niche.
         kernel[tuple(k - 1 for k in niches.shape)] += 0.5
-        return cls(niches, kernel / kernel.sum())
+        some = np.asarray(count) > 0
+        known = np.zeros(len(niches), bool)
+        known[parent[some]] = known[child[some]] = True
+        return cls(niches, kernel / kernel.sum(), known)
+
+    @property
+    def stay(self) -> float:
+        """Share of births at no distance."""
+        return float(self.kernel[tuple(k - 1 for k in self.niches.shape)])
 
     @cached_property
     def within(self) -> Floats:
         """Share of the kernel that stays in the grid, for a parent in each niche, (n,)."""
         stays = self.to_parents(np.ones((1, len(self.niches))))[0]
         # What stays where it is is left by rounding, too.
-        within: Floats = np.maximum(stays, self.kernel[tuple(k - 1 for k in self.niches.shape)])
+        within: Floats = np.maximum(stays, self.stay)
         return within
 
     def at(self, parent: Ints, child: Ints) -> Floats:
         """K_ij of some pairs of niches, (N,)."""
-        found: Floats = self.kernel[_cells_apart(self.niches, parent, child)]
+        there = self.known[child] | (child == parent)
+        found: Floats = np.where(there, self.kernel[_cells_apart(self.niches, parent, child)], 0.0)
         return found
 
     def rows(self, parent: Ints) -> Floats:
@@ -101,16 +117,25 @@ class GridDisplacement:
         windows = np.lib.stride_tricks.sliding_window_view(self.kernel, shape)
         start = np.unravel_index(parent, shape)
         seen = tuple(k - 1 - i for i, k in zip(start, shape, strict=True))
-        found: Floats = windows[seen].reshape(parent.size, -1)
+        found: Floats = windows[seen].reshape(parent.size, len(self.niches)) * self.known
+        found[np.arange(parent.size), parent] = self.stay
         return found
 
     def to_parents(self, values: Floats) -> Floats:
         """Σ_j K_ij x_j for each row x of values (c, n)."""
-        return self._moved(values, self._spectrum)
+        moved: Floats = self._moved(values * self.known, self._spectrum) + self._staying * values
+        return moved
 
     def to_children(self, values: Floats) -> Floats:
         """Σ_i x_i K_ij for each row x of values (c, n)."""
-        return self._moved(values, self._spectrum.conj())
+        moved: Floats = self._moved(values, self._spectrum.conj()) * self.known + self._staying * values
+        return moved
+
+    @cached_property
+    def _staying(self) -> Floats:
+        """What is left to those who stay where nobody was born, (n,)."""
+        staying: Floats = np.where(self.known, 0.0, self.stay)
+        return staying
 
     def sample(self, parent: Ints, rng: np.random.Generator) -> Ints:
         """A niche in bounds for a child of each parent (N,), which are niches."""
@@ -120,12 +145,17 @@ class GridDisplacement:
         shape = np.array(self.niches.shape)
         open_ = np.arange(parent.size)
         # Drawing again whatever lands off the grid conditions the kernel on staying in it.
-        while open_.size:
+        for _ in range(_PATIENCE):
+            if not open_.size:
+                break
             moves = self._moves.draw(np.zeros(open_.size, np.int64), rng)
             landed = displacement_steps.landed(parent[open_], moves, shape)
-            stays = landed >= 0
+            stays = (landed >= 0) & (self.known[landed] | (landed == parent[open_]))
             child[open_[stays]] = landed[stays]
             open_ = open_[~stays]
+        if open_.size:
+            far, which = np.unique(parent[open_], return_inverse=True)
+            child[open_] = RowSampler(sparse.csr_array(self.rows(far))).draw(which, rng)
         return child
 
     def own(self, parent: Ints, child: Ints) -> tuple[Floats, Floats]:  # noqa: ARG002

@@ -168,8 +168,9 @@ def _empirical_bayes(counts: TransitionCounts, strength: float | None) -> NicheC
 
 
 def refitted(posterior: DirichletPosterior, counts: TransitionCounts) -> DirichletPosterior:
-    """The same strength and design effect for other counts, and the base measure that these give."""
-    base = fit_prior(counts, posterior.strength).base
+    """The same strength, design effect and weights for other counts, and the base that these give."""
+    assert posterior.prior is not None
+    base = fit_prior(counts, posterior.strength, posterior.prior.weights).base
     return replace(posterior, counts=counts, base=base, prior=None)
 
 

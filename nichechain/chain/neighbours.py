@@ -18,8 +18,9 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Flags = NDArray[np.bool_]
 
-# Neighbours at most so many cells away speak, with the weight of a standard normal at their distance.
-_REACH = 2
+# Neighbours at most so many cells away speak, with the weight of a normal distribution half as wide: further
+# away where that makes few neighbours of many.
+_REACH, _FAR_REACH, _FAR_AXES = 2, 3, 2
 # One imaginary birth that the pools speak for keeps a niche of silent neighbours from being told nothing.
 _IMAGINARY = 1.0
 _LANDING, _MOVING = 0, 1
@@ -56,7 +57,11 @@ class Neighbours:
     ----------
     niches : GridNiches
     parent, child : (E,) int64 arrays
-        Pairs of states, each once and sorted.
+        Pairs of states whose births speak, each once and sorted.
+    place : (N,) int64 array
+        Those of them that are spoken of, see :meth:`shares`.
+    far : bool
+        Whether neighbours three cells away speak on grids of up to two axes, instead of two.
 
     Notes
     -----
@@ -65,16 +70,14 @@ class Neighbours:
     from the niche, and in the same direction, as they landed from the neighbour.
     """
 
-    def __init__(self, niches: GridNiches, parent: Ints, child: Ints) -> None:
+    def __init__(self, niches: GridNiches, parent: Ints, child: Ints, place: Ints, *, far: bool) -> None:
         self.states, self.niches = niches.states, len(niches)
         self.parent, self.child = parent, child
-        self.offsets = list(_offsets(niches, parent, child))
+        self.offsets = list(_offsets(niches, parent, child, far=far))
         self._pair = parent * self.states + child
-        # Of all that is said, what is said of pairs that have births: whose words, and to which pair.
-        self._heard = [
-            [_seen(self._pair, *self.words(kind, offset)) for offset in self.offsets]
-            for kind in (_LANDING, _MOVING)
-        ]
+        self._spoken_of = parent[place]
+        # Of all that is said, what is said of pairs that are asked about.
+        self._heard = [self._words_about(self._pair[place], kind) for kind in (_LANDING, _MOVING)]
 
     def words(self, kind: int, offset: _Offset) -> tuple[Ints, Ints]:
         """Pairs that speak, and the codes (row · S + column) of what they speak of."""
@@ -97,29 +100,30 @@ class Neighbours:
         """Births that each niche hears of through each offset, weighted, (K, S)."""
         told = np.zeros((len(self.offsets), self.states))
         speakers, first = np.unique(self.parent, return_index=True)
+        if not speakers.size:
+            return told
+        whole = np.add.reduceat(births, first)
         for row, offset in zip(told, self.offsets, strict=True):
-            if not speakers.size:
-                break
-            heard = np.add.reduceat(births * offset.pairs(kind), first)
+            # Who has a niche there has it for all its children; which of them would be in the grid differs.
+            heard = whole * offset.told[first]
+            if kind == _MOVING:
+                heard = np.add.reduceat(births * offset.moves, first)
             here = np.flatnonzero(heard)
             row[speakers[here] + offset.shift] = offset.weight * heard[here]
         return told
 
     def shares(self, landing: Floats, moving: Floats) -> Floats:
-        """What neighbours' births of either kind say of each pair, (2, E), at most 1 in all of a row.
+        """What births of neighbours say of the pairs asked about, (2, N), at most 1 in all of a row.
 
         Parameters
         ----------
         landing, moving : (E,) float64 arrays
             Births of each pair that are of this kind.
         """
-        shares = np.zeros((2, landing.size))
+        shares = np.empty((2, self._spoken_of.size))
         for kind, births in enumerate((landing, moving)):
-            for offset, (source, target) in zip(self.offsets, self._heard[kind], strict=True):
-                # No two pairs speak of the same one from the same distance.
-                shares[kind, target] += offset.weight * births[source]
             total = self.said(kind, births).sum(axis=0)
-            shares[kind] /= (total + _IMAGINARY)[self.parent]
+            shares[kind] = (self._heard[kind] @ births) / (total + _IMAGINARY)[self._spoken_of]
         return shares
 
     def rows(self, landing: Floats, moving: Floats, weights: Floats) -> NearRows:
@@ -133,17 +137,33 @@ class Neighbours:
         return NearRows(self, np.stack([landing, moving]), weights)
 
     @cached_property
-    def entries(self) -> tuple[Ints, Ints, Ints]:
-        """Where in a sparse matrix all that is said adds up; its columns, and where its rows start."""
-        said = [self.words(kind, offset)[1] for kind in (_LANDING, _MOVING) for offset in self.offsets]
-        code, entry = np.unique(np.concatenate(said), return_inverse=True)
-        start = np.searchsorted(code, np.arange(self.states + 1) * self.states)
-        return entry, code % self.states, start
+    def entries(self) -> tuple[Ints, tuple[sparse.csr_array, sparse.csr_array]]:
+        """All pairs that are spoken of, by their codes (M,), and by kind who says how much, (M, E)."""
+        said = np.zeros(self.states**2, bool)
+        for kind, offset in product((_LANDING, _MOVING), self.offsets):
+            said[self.words(kind, offset)[1]] = True
+        code = np.flatnonzero(said)
+        return code, (self._words_about(code, _LANDING), self._words_about(code, _MOVING))
 
     @cached_property
     def moves(self) -> Flags:
         """Pairs that each offset hears of as moved, (K, E)."""
         return np.stack([offset.moves for offset in self.offsets])
+
+    def _words_about(self, code: Ints, kind: int) -> sparse.csr_array:
+        """How much a birth of each pair says of each of some pairs, given by their sorted codes, (N, E)."""
+        targets, sources, weights = [], [], []
+        for offset in self.offsets if code.size else []:
+            source, said = self.words(kind, offset)
+            place = np.minimum(np.searchsorted(code, said), code.size - 1)
+            there = code[place] == said
+            targets.append(place[there].astype(np.int32))
+            sources.append(source[there].astype(np.int32))
+            weights.append(np.full(targets[-1].size, offset.weight))
+        if not targets:
+            return sparse.csr_array((code.size, self._pair.size))
+        index = np.concatenate(targets), np.concatenate(sources)
+        return sparse.csr_array((np.concatenate(weights), index), shape=(code.size, self._pair.size))
 
     @cached_property
     def starts(self) -> Ints:
@@ -176,16 +196,13 @@ class NearRows:
     @cached_property
     def matrix(self) -> sparse.csr_array:
         """The whole of it, (S, S)."""
-        offsets, states = self.neighbours.offsets, self.neighbours.states
-        parts = []
-        for kind, births in enumerate(self.births):
-            share = self._share[kind]
-            for offset in offsets:
-                source = offset.pairs(kind)
-                row = self.neighbours.parent[source] + offset.shift
-                parts.append(offset.weight * births[source] * share[row])
-        entry, column, start = self.neighbours.entries
-        data = np.bincount(entry, np.concatenate(parts), column.size)
+        states = self.neighbours.states
+        code, words = self.neighbours.entries
+        row, column = np.divmod(code, states)
+        data = np.zeros(code.size)
+        for share, who, births in zip(self._share, words, self.births, strict=True):
+            data += share[row] * (who @ births)
+        start = np.searchsorted(row, np.arange(states + 1))
         return sparse.csr_array((data, column, start), shape=(states, states))
 
     def at(self, parent: Ints, child: Ints) -> Floats:
@@ -252,28 +269,33 @@ class NearRows:
         return through
 
 
-def _offsets(niches: GridNiches, parent: Ints, child: Ints) -> Iterator[_Offset]:
+def neighbourhood(niches: GridNiches, *, far: bool) -> int:
+    """How many neighbours a niche in the middle of a large grid has."""
+    return len(_steps(niches, far=far))
+
+
+def _steps(niches: GridNiches, *, far: bool) -> list[tuple[tuple[int, ...], float]]:
+    """How far a neighbour is along each axis, and its weight."""
+    axes = len(niches.shape)
+    reach = _FAR_REACH if far and axes <= _FAR_AXES else _REACH
+    steps = []
+    for step in product(range(-reach, reach + 1), repeat=axes):
+        square = sum(along * along for along in step)
+        if 0 < square <= reach**2:
+            steps.append((step, float(np.exp(-2.0 * square / reach**2))))
+    return steps
+
+
+def _offsets(niches: GridNiches, parent: Ints, child: Ints, *, far: bool) -> Iterator[_Offset]:
     n, shape = len(niches), niches.shape
     inside, outside = parent < n, child >= n
     start = np.unravel_index(np.minimum(parent, n - 1), shape)
     end = np.unravel_index(np.minimum(child, n - 1), shape)
     strides = [int(np.prod(shape[axis + 1 :])) for axis in range(len(shape))]
-    for steps in product(*[range(-_REACH, _REACH + 1)] * len(shape)):
-        square = sum(step * step for step in steps)
-        if not 0 < square <= _REACH**2:
-            continue
+    for step, weight in _steps(niches, far=far):
         told, stays = inside.copy(), np.ones(child.size, bool)
-        for cell, moved, step, size in zip(start, end, steps, shape, strict=True):
-            told &= (cell + step >= 0) & (cell + step < size)
-            stays &= (moved + step >= 0) & (moved + step < size)
-        shift = sum(step * stride for step, stride in zip(steps, strides, strict=True))
-        yield _Offset(shift, float(np.exp(-0.5 * square)), told, told & (stays | outside))
-
-
-def _seen(pair: Ints, source: Ints, code: Ints) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-    """Of words about pairs of these codes, those about pairs that there are: whose, and about which."""
-    if not pair.size:
-        return np.zeros(0, np.int32), np.zeros(0, np.int32)
-    place = np.minimum(np.searchsorted(pair, code), pair.size - 1)
-    there = pair[place] == code
-    return source[there].astype(np.int32), place[there].astype(np.int32)
+        for cell, moved, along, size in zip(start, end, step, shape, strict=True):
+            told &= (cell + along >= 0) & (cell + along < size)
+            stays &= (moved + along >= 0) & (moved + along < size)
+        shift = sum(along * stride for along, stride in zip(step, strides, strict=True))
+        yield _Offset(shift, weight, told, told & (stays | outside))

@@ -61,6 +61,8 @@ class Purpose(IntEnum):
     """What one elite's children are drawn from; index: the draw of T and the state."""
     GRANDCHILD = 42
     """A child's child, made to measure meta-evolvability; index: its number."""
+    LEFT_OUT = 43
+    """Which elites the prior of an estimate is judged by, while it is made of the others' births."""
     TESSELLATION = 30
     """Uniform samples that a Voronoi tessellation is made of."""
 

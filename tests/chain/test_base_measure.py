@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from nichechain import GridNiches, TransitionCounts
+from nichechain.chain import displacement
 from nichechain.chain.base_measure import BaseMeasure
 
 GRIDS = {
@@ -57,7 +58,9 @@ def _naive_components(niches, pairs, parent):
     displaced = np.zeros(states)
     for j in range(n):
         move = tuple(b - a for a, b in zip(niches.index(parent), niches.index(j), strict=True))
-        displaced[j] = tally.get(move, 0.0)
+        # To where nobody was born, only a child that stays is displaced.
+        if j == parent or any(j in pair for pair in pairs if n not in pair):
+            displaced[j] = tally.get(move, 0.0)
     leaving = left / max(1, left + stayed)
     displaced *= (1.0 - leaving) / displaced.sum()
     if states > n:
@@ -66,9 +69,10 @@ def _naive_components(niches, pairs, parent):
 
 
 @pytest.mark.parametrize("outside", ["state", "absorb", "clip"])
+@pytest.mark.parametrize("births", [80, 6])
 @pytest.mark.parametrize("name", GRIDS)
-def test_rows_equal_a_double_loop_over_births(name, outside):
-    counts, pairs = _counts(name, outside)
+def test_rows_equal_a_double_loop_over_births(name, births, outside):
+    counts, pairs = _counts(name, outside, births)
     base = BaseMeasure.pooled(counts, WEIGHTS)
     states = counts.niches.states
     expected = np.array([_naive_components(counts.niches, pairs, i) for i in range(states)])
@@ -105,11 +109,11 @@ def test_without_births_a_displaced_child_stays():
 def test_displacement_is_one_move_for_all_niches():
     # All births move one cell along x; at the far edge only staying is left.
     niches = GridNiches(*GRIDS["plane"], "clip")
-    counts = TransitionCounts.from_pairs([0, 1, 2] * 5, [3, 4, 5] * 5, niches)
+    counts = TransitionCounts.from_pairs(np.arange(9), np.arange(9) + 3, niches)
     rows = BaseMeasure.pooled(counts, np.array([0.0, 1.0, 0.0])).rows(np.arange(12))
     for i in range(9):
-        assert rows[i, i + 3] == pytest.approx(15 / 15.5, rel=1e-9)
-        assert rows[i, i] == pytest.approx(0.5 / 15.5, rel=1e-9)
+        assert rows[i, i + 3] == pytest.approx(9 / 9.5, rel=1e-9)
+        assert rows[i, i] == pytest.approx(0.5 / 9.5, rel=1e-9)
     for i in range(9, 12):
         assert rows[i, i] == pytest.approx(1.0, rel=1e-9)
 
@@ -117,9 +121,11 @@ def test_displacement_is_one_move_for_all_niches():
 @pytest.mark.parametrize(
     "weights", [WEIGHTS, *np.eye(3)], ids=["mixed", "destination", "displacement", "uniform"]
 )
-@pytest.mark.parametrize("name", ["plane", "space"])
-def test_draws_follow_the_rows(name, weights):
-    counts, _ = _counts(name, "state")
+@pytest.mark.parametrize("patience", [0, 100])
+@pytest.mark.parametrize(("name", "births"), [("plane", 80), ("space", 80), ("plane", 6)])
+def test_draws_follow_the_rows(name, births, weights, patience, monkeypatch):
+    monkeypatch.setattr(displacement, "_PATIENCE", patience)
+    counts, _ = _counts(name, "state", births)
     base = BaseMeasure.pooled(counts, weights)
     states = counts.niches.states
     size = 4000

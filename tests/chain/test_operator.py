@@ -42,9 +42,10 @@ def in_atoms(monkeypatch):
 
 
 @pytest.mark.parametrize("outside", OUTSIDE)
+@pytest.mark.parametrize("births", [60, 5])
 @pytest.mark.parametrize("name", GRIDS)
-def test_the_mean_in_parts_is_the_mean(name, outside):
-    posterior = _posterior(GRIDS[name], outside)
+def test_the_mean_in_parts_is_the_mean(name, births, outside):
+    posterior = _posterior(GRIDS[name], outside, births=births)
     mean, parts = posterior.mean(), posterior.mean_operator()
     states = len(mean)
     assert parts.shape == mean.shape

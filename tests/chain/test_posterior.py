@@ -37,7 +37,7 @@ def _posterior(strength, outside="state"):
     child = np.minimum(rng.poisson(3, parent.size), states - 1)
     counts = TransitionCounts.from_pairs(parent, child, niches)
     destination = DESTINATION[:states] / DESTINATION[:states].sum()
-    kernel = GridDisplacement(niches, np.ones((7, 5)) / 35)
+    kernel = GridDisplacement(niches, np.ones((7, 5)) / 35, np.ones(len(niches), bool))
     base = BaseMeasure(niches, destination, kernel, 0.0, np.array([0.75, 0.0, 0.25]))
     shares = np.zeros((states, states))
     for i, j in zip(parent, child, strict=True):
@@ -153,7 +153,7 @@ def test_a_base_worth_next_to_nothing_sends_all_children_to_one_state(shape, str
     base = BaseMeasure(
         niches,
         np.full(states, 1 / states),
-        GridDisplacement(niches, np.ones([2 * k - 1 for k in shape])),
+        GridDisplacement(niches, np.ones([2 * k - 1 for k in shape]), np.ones(len(niches), bool)),
         0.0,
         np.array([1.0, 0.0, 0.0]),
     )

@@ -18,6 +18,7 @@ const T = {
   pools: unpack(data.pools, Float32Array),
   spread: unpack(data.spread, Float32Array),
   kernel: unpack(data.kernel, Float32Array),
+  known: unpack(data.known, Uint8Array),
 };
 const returns = unpack(data.returns, Float64Array);
 const counts = {
@@ -88,7 +89,8 @@ function advance(here) {
     const [x, y] = index(i);
     for (let column = 0, j = 0; column < columns; column++) {
       const offset = (column - x + columns - 1) * (2 * rows - 1) + rows - 1 - y;
-      for (let line = 0; line < rows; line++, j++) there[j] += spread * T.kernel[offset + line];
+      for (let line = 0; line < rows; line++, j++)
+        if (T.known[j] || j === i) there[j] += spread * T.kernel[offset + line];
     }
   }
   return there;
@@ -100,7 +102,7 @@ function entry(i, j) {
   let found = 0;
   for (let pool = 0; pool < pools; pool++) found += T.shares[i * pools + pool] * T.pools[pool * S + j];
   for (let k = T.start[i]; k < T.start[i + 1]; k++) if (T.column[k] === j) found += T.probability[k];
-  if (T.spread[i] && j < n) {
+  if (T.spread[i] && j < n && (T.known[j] || j === i)) {
     const [[x, y], [column, line]] = [index(i), index(j)];
     found += T.spread[i] * T.kernel[(column - x + columns - 1) * (2 * rows - 1) + rows - 1 - y + line];
   }

@@ -63,7 +63,9 @@ def rounded_transition(chain: NicheChain) -> tuple[PooledTransition, int]:
 def transition(chain: NicheChain) -> dict[str, Any]:
     """What the page computes with."""
     T, each = rounded_transition(chain)
-    kernel = T.displacement.kernel if isinstance(T.displacement, GridDisplacement) else np.zeros(0)
+    kernel, known = np.zeros(0), np.zeros(0, bool)
+    if isinstance(T.displacement, GridDisplacement):
+        kernel, known = T.displacement.kernel, T.displacement.known
     dense = T.toarray()
     if chain.states > MOST_EXACT:
         # Whole matrices multiply twice as fast; what a page shows has three digits.
@@ -76,6 +78,7 @@ def transition(chain: NicheChain) -> dict[str, Any]:
         "pools": packed(T.pools, np.float32),
         "spread": packed(T.spread, np.float32),
         "kernel": packed(kernel, np.float32),
+        "known": packed(known, np.uint8),
         "returns": packed(all_return_probabilities(dense, LONGEST - 1), np.float64),
         "strongest": each,
     }

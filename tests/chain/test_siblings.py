@@ -1,22 +1,15 @@
-"""Empirical Bayes: likeness of siblings, and what rows that have not seen an elite say of its children."""
+"""Likeness of siblings, and what it does to strength and posterior."""
 
 import itertools
 
 import numpy as np
 import pytest
-from scipy import sparse, stats
+from scipy import sparse
 
-from nichechain.chain.base_measure import BaseMeasure
 from nichechain.chain.counts import TransitionCounts
-from nichechain.chain.displacement import GridDisplacement
-from nichechain.chain.empirical_bayes import (
-    _left_out,
-    design_effect,
-    sibling_correlation,
-    strength_of,
-)
 from nichechain.chain.estimators import estimate
 from nichechain.chain.prior import fit_prior
+from nichechain.chain.siblings import design_effect, sibling_correlation
 from nichechain.niches import GridNiches
 
 ROW = GridNiches((4,), ((0.0, 4.0),))
@@ -24,68 +17,6 @@ ROW = GridNiches((4,), ((0.0, 4.0),))
 
 def _dense(chain):
     return chain.T.toarray() if sparse.issparse(chain.T) else np.asarray(chain.T)
-
-
-def _simulate(base, strength, births, seed):
-    """Births of a chain whose rows are Dirichlet(s B), and the chain."""
-    rng = np.random.default_rng(seed)
-    states = base.niches.states
-    truth = np.array([rng.dirichlet(strength * row) for row in base.rows(np.arange(states))])
-    table = np.array([rng.multinomial(births, row / row.sum()) for row in truth])
-    parent, child = np.nonzero(table)
-    pairs = np.repeat(parent, table[parent, child]), np.repeat(child, table[parent, child])
-    return TransitionCounts.from_pairs(*pairs, base.niches), truth
-
-
-def _known_base(weights, shape=(10, 10)):
-    """A base with a few favourite destinations and displacements of a cell or two."""
-    niches = GridNiches(shape, ((0.0, 1.0),) * 2)
-    destination = stats.zipf(1.3).pmf(1 + np.random.default_rng(3).permutation(niches.states))
-    x, y = np.mgrid[1 - shape[0] : shape[0], 1 - shape[1] : shape[1]]
-    kernel = np.exp(-(x**2 + y**2) / 4)
-    displacement = GridDisplacement(niches, kernel / kernel.sum())
-    return BaseMeasure(niches, destination / destination.sum(), displacement, 0.05, np.array(weights))
-
-
-@pytest.mark.parametrize("strength", [1.0, 5.0, 30.0])
-@pytest.mark.parametrize("weights", [(0.9, 0.05, 0.05), (0.05, 0.9, 0.05), (0.45, 0.45, 0.1)])
-def test_strength_and_mixture_are_learned_from_births(strength, weights):
-    counts, _ = _simulate(_known_base(weights), strength, 100, seed=4)
-    prior = fit_prior(counts)
-    fitted, mixture = prior.strength, prior.base.weights
-    # A hundred rows of a hundred births pin s down to a few per cent, if B were known; it is not.
-    assert fitted == pytest.approx(strength, rel=0.35)
-    assert mixture.sum() == pytest.approx(1.0)
-    # Rows of s = 1 have a handful of states each, and their pool is a rough picture of B.
-    np.testing.assert_allclose(mixture, weights, atol=0.3 if strength < 5 else 0.2)
-
-
-def test_the_learned_strength_is_near_the_most_likely_one_for_the_true_base():
-    base = _known_base((0.45, 0.45, 0.1))
-    counts, _ = _simulate(base, 5.0, 60, seed=8)
-    table = counts.matrix.toarray()
-    rows = base.rows(np.arange(101))
-    strengths = np.geomspace(0.5, 50, 81)
-    # scipy's Dirichlet-multinomial, row by row.
-    likelihood = [
-        sum(stats.dirichlet_multinomial.logpmf(row, s * b, 60) for row, b in zip(table, rows, strict=True))
-        for s in strengths
-    ]
-    best = strengths[np.argmax(likelihood)]
-    assert fit_prior(counts).strength == pytest.approx(best, rel=0.3)
-    assert strength_of(counts, lambda i, j: rows[i, j])[0] == pytest.approx(best, rel=0.3)
-
-
-def test_the_estimate_is_nearly_as_near_to_the_truth_as_can_be():
-    base = _known_base((0.45, 0.45, 0.1))
-    counts, truth = _simulate(base, 5.0, 10, seed=1)
-    # The posterior mean under the strength and the base that rows were drawn with: by Bayes, no
-    # estimate has a smaller expected squared error.
-    best = (counts.matrix.toarray() + 5.0 * base.rows(np.arange(101))) / 15.0
-    estimates = (best, estimate(counts).T, _dense(estimate(counts, "mle")))
-    errors = [((matrix - truth) ** 2).sum(axis=1).mean() for matrix in estimates]
-    assert errors[0] < errors[1] < 1.05 * errors[0]
-    assert errors[2] > 1.3 * errors[0]
 
 
 def _families(concentration, elites, children, seed):
@@ -135,19 +66,6 @@ def test_correlation_by_listing_every_pair():
     expected = (of_siblings - of_cousins) / (1 - of_cousins)
     assert expected > 0
     assert sibling_correlation(counts) == pytest.approx(expected)
-
-
-def test_every_birth_is_foretold_once_and_without_its_family():
-    parent = np.array([0, 0, 0, 0, 2, 2, 3, -1])
-    child = np.array([1, 1, 2, 0, 2, 2, -1, 3])
-    elite = np.array([5, 5, 5, 6, 7, 8, 9, -1])
-    known = TransitionCounts.from_births(parent, child, ROW, elite=elite)
-    both = known + TransitionCounts.from_pairs([2, 2, 1], [2, 2, 0], ROW)
-    left = _left_out(both)
-    assert left.weight.sum() == both.births.sum() == 9
-    rows = {tuple(row) for row in np.stack([left.parent, left.child, left.children, left.family]).T}
-    # Two families in niche 0, two only children in 2; births without a family stand alone.
-    assert rows == {(0, 1, 2, 3), (0, 2, 1, 3), (0, 0, 1, 1), (2, 2, 1, 1), (1, 0, 1, 1)}
 
 
 def test_merged_runs_keep_their_elites_apart():
