@@ -26,8 +26,9 @@ def _both(chain, monkeypatch, **asks):
 def test_lineages_of_a_niche_reach_what_the_closed_form_says(chain, monkeypatch, convention):
     niche = int(np.argmax(chain.births))
     exact, drawn = _both(chain, monkeypatch, niche=niche, l=3, lineages=8, convention=convention)
-    # 300 draws of 1,333 lineages or fewer, and the spread of T over draws.
-    spread = (exact.high - exact.low) / 3.29 + 1e-3
+    # 300 draws of 1,333 lineages or fewer, and the spread of T over draws: where a niche is hardly ever
+    # reached, an interval says too little of it.
+    spread = (exact.high - exact.low) / 3.29 + 5e-3
     assert (np.abs(drawn.at_least_one - exact.at_least_one) < 6 * spread / np.sqrt(150)).all()
     np.testing.assert_allclose(drawn.visit, exact.visit, atol=0.01)
     np.testing.assert_allclose(drawn.expected_visits, exact.expected_visits, atol=0.12)
