@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import digamma
@@ -12,31 +10,15 @@ from nichechain.chain.kinds import Kinds
 
 Floats = NDArray[np.float64]
 
-LEAST_UNIFORM = 5e-4
-"""The weight that all states alike have at least, so that nothing is impossible."""
-
+# The weight that all states alike have at least, so that nothing is impossible.
+_LEAST_UNIFORM = 5e-4
 _ROUNDS = 6
 _STEPS = 6
 _STRENGTH = 30.0
 _STRENGTHS = (0.1, 1e5)
 
 
-class Attribution(NamedTuple):
-    """What came of it.
-
-    Parameters
-    ----------
-    pools : (p, E) float64 array
-        Independent births of each pair that each pool has.
-    weights : (k,) float64 array
-        Of the kinds.
-    """
-
-    pools: Floats
-    weights: Floats
-
-
-def attributed(kinds: Kinds, births: Floats, total: Floats, weights: Floats | None = None) -> Attribution:
+def attributed(kinds: Kinds, births: Floats, total: Floats, weights: Floats | None = None) -> Floats:
     """Share births out among the kinds that explain them.
 
     Parameters
@@ -48,6 +30,11 @@ def attributed(kinds: Kinds, births: Floats, total: Floats, weights: Floats | No
         Of each row.
     weights : (k,) float64 array, optional
         Of the kinds; by default what makes the births most likely.
+
+    Returns
+    -------
+    (p, E) float64 array
+        Independent births of each pair that each pool has.
 
     Notes
     -----
@@ -76,12 +63,12 @@ def attributed(kinds: Kinds, births: Floats, total: Floats, weights: Floats | No
             found = drawn.sum() / (digamma(total + strength) - digamma(strength)).sum()
             strength = float(np.clip(found, *_STRENGTHS))
         pools = kinds.pooled(before[:, None] * expected * share)
-    return Attribution(pools, weights)
+    return pools
 
 
 def floored(weights: Floats) -> Floats:
     """Weights (k,) that add up to 1, the last of them not too small."""
     weights = weights / weights.sum()
-    uniform = max(float(weights[-1]), LEAST_UNIFORM)
-    scale = (1.0 - uniform) / max(1.0 - float(weights[-1]), LEAST_UNIFORM)
+    uniform = max(float(weights[-1]), _LEAST_UNIFORM)
+    scale = (1.0 - uniform) / max(1.0 - float(weights[-1]), _LEAST_UNIFORM)
     return np.append(weights[:-1] * scale, uniform)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,15 +52,9 @@ class DistanceDisplacement:
     @classmethod
     def pooled(cls, niches: Niches, parent: Ints, child: Ints, count: Ints | Floats) -> DistanceDisplacement:
         """Distances of births from niche to niche."""
-        n, axes = niches.centers.shape
-        spans = niches.upper - niches.lower
-        width = float(np.prod((spans / n ** (1.0 / axes)) ** (1.0 / axes)))
-        number = 2 + int(np.linalg.norm(spans) / width + 0.5)
-        shells = np.zeros((n, number), np.int64)
-        for rows in _blocks(n):
-            away = _away(niches.centers, rows, np.arange(n), width)
-            flat = away + number * np.arange(len(away))[:, None]
-            shells[rows] = np.bincount(flat.ravel(), minlength=number * len(away)).reshape(-1, number)
+        n = len(niches)
+        width, shells = _shells(niches)
+        number = shells.shape[1]
         births = np.bincount(_shell(niches, parent, child, width), count, number).astype(np.float64)
         exposure = np.bincount(parent, count, n).astype(np.float64) @ shells
         # Half a birth at no distance keeps K usable from every niche.
@@ -141,6 +135,25 @@ class DistanceDisplacement:
     def _made(self, niches: Ints) -> Floats:
         made: Floats = self.rate[_away(self.niches.centers, niches, np.arange(len(self.niches)), self.width)]
         return made
+
+
+@lru_cache(maxsize=2)
+def _shells(niches: Niches) -> tuple[float, Ints]:
+    """Width of a niche, and how many niches each shell of each has, (n, b).
+
+    Kept, as a base measure is made some dozens of times for one estimate, and pairs of niches are many.
+    """
+    n, axes = niches.centers.shape
+    spans = niches.upper - niches.lower
+    width = float(np.prod((spans / n ** (1.0 / axes)) ** (1.0 / axes)))
+    number = 2 + int(np.linalg.norm(spans) / width + 0.5)
+    shells = np.zeros((n, number), np.int64)
+    for rows in _blocks(n):
+        away = _away(niches.centers, rows, np.arange(n), width)
+        flat = away + number * np.arange(len(away))[:, None]
+        shells[rows] = np.bincount(flat.ravel(), minlength=number * len(away)).reshape(-1, number)
+    shells.flags.writeable = False
+    return width, shells
 
 
 def _shell(niches: Niches, parent: Ints, child: Ints, width: float) -> Ints:

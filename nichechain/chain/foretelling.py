@@ -92,14 +92,14 @@ def leave_out(counts: TransitionCounts, kinds: Kinds, parent: Ints, child: Ints)
     parts = []
     seen = entries = 0
     for number in range(folds):
+        if seen >= _ENOUGH:
+            break
         out = fold == number
-        if not out.any() or seen >= _ENOUGH:
-            continue
         left, gone = families[~out], families[out, 3].astype(np.float64)
         total = np.bincount(left[:, 0], left[:, 3], states).astype(np.int64)
         effect = effect_of(left, total, correlation)
         own = np.bincount(pair[~out], left[:, 3], parent.size) / effect[parent]
-        expected = kinds.expected(attributed(kinds, own, total / effect).pools)
+        expected = kinds.expected(attributed(kinds, own, total / effect))
         some, entry = np.unique(pair[out], return_inverse=True)
         held = np.bincount(entry, gone, some.size)
         row = (total / effect)[parent[some]]

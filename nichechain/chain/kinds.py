@@ -94,8 +94,8 @@ class Kinds:
             return np.stack([fell, moved, anywhere])
         assert isinstance(self.niches, GridNiches)
         smooth = smoothed_states(self.niches, guessed.destination)[self._child] * every
-        smooth = np.maximum(smooth - CENTRE ** len(self.niches.shape) * landing, _TINY)
-        smooth /= every - CENTRE ** len(self.niches.shape) * own
+        kept = CENTRE ** len(self.niches.shape)
+        smooth = np.maximum(smooth - kept * landing, _TINY) / (every - kept * own)
         moved_smoothly = self._moved(replace(guessed, displacement=_smoothed(guessed)))
         near = self._near.expected(pools[_NEAR_LANDING], pools[_NEAR_MOVING])
         return np.stack([fell, smooth, moved, moved_smoothly, *near, anywhere])

@@ -98,5 +98,5 @@ def fit_prior(
     error = 0.0
     if strength is None or weights is None:
         weights, strength, error = weighed(leave_out(counts, kinds, parent, child), strength)
-    pools = attributed(kinds, births, counts.births / effect, weights).pools
+    pools = attributed(kinds, births, counts.births / effect, weights)
     return FittedPrior(kinds.base(pools, weights), strength, error, effect, kinds, pools, weights)

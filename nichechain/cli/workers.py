@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager
 from typing import TYPE_CHECKING
 
 from nichechain.cli import progress
@@ -12,12 +11,9 @@ if TYPE_CHECKING:
     from nichechain.execution import Executor
 
 
-@contextmanager
-def hired(workers: str | None, cache_memory: str | None) -> Iterator[Executor]:
+def hired(workers: str | None, cache_memory: str | None) -> AbstractContextManager[Executor]:
     """The executor of ``--workers`` and ``--cache-memory``, with something that turns while Ray starts."""
     from nichechain import execution
 
     with progress.spinner("starting workers"):
-        made = execution.make(workers, cache_memory)
-    with made as executor:
-        yield executor
+        return execution.make(workers, cache_memory)
