@@ -346,6 +346,8 @@ def read_births(folder: Path, meta: Meta, columns: list[str] | None = None) -> p
         axes = len(meta.config.bounds)
         empty = births.schema(axes).empty_table()
         empty = empty if columns is None else empty.select(columns)
+        # What decoding took would stay with pyarrow, a tenth of what a million births need afterwards.
+        pa.default_memory_pool().release_unused()
         return pa.concat_tables([empty, *tables])[: meta.births]
 
 

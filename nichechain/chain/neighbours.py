@@ -72,6 +72,7 @@ class Neighbours:
 
     def __init__(self, niches: GridNiches, parent: Ints, child: Ints, place: Ints, *, far: bool) -> None:
         self.states, self.niches = niches.states, len(niches)
+        self._shape = niches.shape
         self.parent, self.child = parent, child
         self.offsets = list(_offsets(niches, parent, child, far=far))
         self._pair = parent * self.states + child
@@ -136,19 +137,56 @@ class Neighbours:
         """
         return NearRows(self, np.stack([landing, moving]), weights)
 
-    @cached_property
-    def entries(self) -> tuple[Ints, tuple[sparse.csr_array, sparse.csr_array]]:
-        """All pairs that are spoken of, by their codes (M,), and by kind who says how much, (M, E)."""
-        said = np.zeros(self.states**2, bool)
-        for kind, offset in product((_LANDING, _MOVING), self.offsets):
-            said[self.words(kind, offset)[1]] = True
-        code = np.flatnonzero(said)
-        return code, (self._words_about(code, _LANDING), self._words_about(code, _MOVING))
+    def heard(self, kind: int, births: Floats) -> sparse.csr_array:
+        """Births (E,) that each niche hears of, weighted, by the state that they speak of, (S, S).
+
+        Notes
+        -----
+        A sum over speakers of rows that neighbours have in common: columns are states where births landed,
+        or displacements where they moved.
+        """
+        rows, weights = [], []
+        speakers, first = np.unique(self.parent, return_index=True)
+        for offset in self.offsets:
+            here = speakers[offset.told[first]]
+            rows.append(np.stack([here + offset.shift, here]))
+            weights.append(np.full(here.size, offset.weight))
+        whole = self.states, self.states
+        hears = sparse.csr_array((np.concatenate(weights), np.concatenate(rows, axis=1)), shape=whole)
+        starts = self.starts
+        if kind == _LANDING:
+            return hears @ sparse.csr_array((births, self.child, starts), shape=whole)
+        moves, column = np.unique(self._displacement(), return_inverse=True)
+        moved = hears @ sparse.csr_array((births, column, starts), shape=(self.states, moves.size))
+        row = np.repeat(np.arange(self.states), np.diff(moved.indptr))
+        child = self._displaced(np.minimum(row, self.niches - 1), moves[moved.indices])
+        there = child >= 0
+        return sparse.csr_array((moved.data[there], (row[there], child[there])), shape=whole)
 
     @cached_property
     def moves(self) -> Flags:
         """Pairs that each offset hears of as moved, (K, E)."""
         return np.stack([offset.moves for offset in self.offsets])
+
+    def _displacement(self) -> Ints:
+        """How far, and in which direction, the child of each pair is from its parent, (E,); outside last."""
+        cells = (np.minimum(state, self.niches - 1) for state in (self.parent, self.child))
+        start, end = (np.stack(np.unravel_index(cell, self._shape)) for cell in cells)
+        most = np.array(self._shape)[:, None] - 1
+        wide = tuple(2 * size - 1 for size in self._shape)
+        away = np.ravel_multi_index(tuple(end - start + most), wide)
+        return np.where(self.child < self.niches, away, int(np.prod(wide)))
+
+    def _displaced(self, niche: Ints, away: Ints) -> Ints:
+        """The state so far from each niche, (M,), or -1 where that is beyond the grid."""
+        wide = tuple(2 * size - 1 for size in self._shape)
+        nowhere = away == int(np.prod(wide))
+        start = np.stack(np.unravel_index(niche, self._shape))
+        size = np.array(self._shape)[:, None]
+        end = start + np.stack(np.unravel_index(np.where(nowhere, 0, away), wide)) - (size - 1)
+        within = ((end >= 0) & (end < size)).all(axis=0)
+        state = np.ravel_multi_index(tuple(np.clip(end, 0, size - 1)), self._shape)
+        return np.where(nowhere, self.niches, np.where(within, state, -1))
 
     def _words_about(self, code: Ints, kind: int) -> sparse.csr_array:
         """How much a birth of each pair says of each of some pairs, given by their sorted codes, (N, E)."""
@@ -196,14 +234,11 @@ class NearRows:
     @cached_property
     def matrix(self) -> sparse.csr_array:
         """The whole of it, (S, S)."""
-        states = self.neighbours.states
-        code, words = self.neighbours.entries
-        row, column = np.divmod(code, states)
-        data = np.zeros(code.size)
-        for share, who, births in zip(self._share, words, self.births, strict=True):
-            data += share[row] * (who @ births)
-        start = np.searchsorted(row, np.arange(states + 1))
-        return sparse.csr_array((data, column, start), shape=(states, states))
+        landing, moving = (
+            sparse.diags_array(share) @ self.neighbours.heard(kind, births)
+            for kind, (share, births) in enumerate(zip(self._share, self.births, strict=True))
+        )
+        return (landing + moving).tocsr()
 
     def at(self, parent: Ints, child: Ints) -> Floats:
         """Some entries of it, (N,), without the others."""

@@ -46,7 +46,7 @@ class CompareCommand:
     """Independent lineages U: l times U descendants."""
     min_births: int = 20
     """Niches with fewer births behind their row of T, on either side, are left out."""
-    resamples: int = 100
+    resamples: int = 50
     """Resamples of runs, or of elites where a side has one run, for the interval."""
     draws: int = 4
     """Posterior draws of T for each resample."""

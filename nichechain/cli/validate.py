@@ -42,6 +42,7 @@ def run(arguments: Sequence[str]) -> int:
     command = parsing.parse(ValidateCommand, arguments)
     from nichechain.archive.archive import load
     from nichechain.validation import ValidationConfig, validate
+    from nichechain.validation.direct import DRAWS
 
     config = ValidationConfig(
         elites=command.elites,
@@ -64,6 +65,7 @@ def run(arguments: Sequence[str]) -> int:
             config,
             on_done=progress.more(tell, "evaluations", config.evaluations),
             on_permuted=progress.more(tell, "permutations", config.permuted),
+            on_drawn=progress.more(tell, "draws of T", DRAWS),
         )
     # Made only now, so that bad input leaves nothing behind.
     out.mkdir(parents=True, exist_ok=True)

@@ -163,33 +163,38 @@ class _Sums:
         self._middle, self._of = np.unique(niche, return_inverse=True)
         self._size = np.bincount(parent, minlength=niche.size).astype(np.float64)
         columns, column, landed = np.unique(child, return_inverse=True, return_counts=True)
-        self._columns, self._column, self._landed = columns.size, column, landed
+        self._column, self._landed = column, landed
         shape = (self._middle.size, columns.size)
         counts = sparse.coo_array((np.ones(child.size), (self._of[parent], column)), shape=shape).tocsr()
         self._births = np.asarray(counts.sum(axis=1)).ravel()
         self._shares = (sparse.diags_array(1.0 / self._births) @ counts).tocsr()
-        self._spread = self._shares - self._shares.multiply(self._shares)
+        spread = self._shares - self._shares.multiply(self._shares)
+        self._chance = spread @ (1.0 / landed)
 
     def ratio(self, grandparent: Ints) -> float:
         """The statistic for grandparent states (E,)."""
         rows = int(grandparent.max()) + 1
-        width = self._columns
-        seen = np.bincount(grandparent[self._parent] * width + self._column, minlength=rows * width)
-        middle = self._middle.size
-        weights = np.bincount(grandparent * middle + self._of, self._size, minlength=rows * middle)
-        weights = weights.reshape(rows, middle)
-        kept = np.flatnonzero(weights.any(axis=1))
-        weights = weights[kept]
-        expected = (sparse.csr_array(weights) @ self._shares).toarray()
+        shape = rows, self._landed.size
+        pairs = grandparent[self._parent], self._column
+        seen = sparse.coo_array((np.ones(self._child.size), pairs), shape=shape).tocsr()
+        shape = rows, self._middle.size
+        weights = sparse.coo_array((self._size, (grandparent, self._of)), shape=shape).tocsr()
+        weights.eliminate_zeros()
+        total = np.asarray(weights.sum(axis=1)).ravel()
         # Drawn without replacement: an urn that one grandparent's children empty leaves no chance.
-        left = weights * (self._births - weights) / np.maximum(self._births - 1.0, 1.0)
-        variance = (sparse.csr_array(left) @ self._spread).toarray()
-        off = seen.reshape(rows, width)[kept] - expected
+        births = self._births[weights.indices]
+        left = weights.data * (births - weights.data) / np.maximum(births - 1.0, 1.0)
+        chance = float((left * self._chance[weights.indices] / total[_rows(weights)]).sum())
+        off = (seen - weights @ self._shares).tocsr()
         # Divided by row and column sums, not by the expectation given the middle niches: a rare
         # state that one parent keeps breeding into would weigh most where it contradicts T least.
-        scale = weights.sum(axis=1)[:, None] * self._landed
-        chance = float((variance / scale).sum())
-        return float((off**2 / scale).sum()) / chance if chance > 1e-12 else 0.0
+        scale = total[_rows(off)] * self._landed[off.indices]
+        return float((off.data**2 / scale).sum()) / chance if chance > 1e-12 else 0.0
+
+
+def _rows(matrix: sparse.csr_array) -> Ints:
+    """The row of each entry."""
+    return np.repeat(np.arange(matrix.shape[0]), np.diff(matrix.indptr))
 
 
 class _Distant:

@@ -24,8 +24,9 @@ from nichechain.evolvability.averaging import spread_of
 from nichechain.evolvability.coverage import coverage_by_generation, rarefied_coverage
 from nichechain.evolvability.question import MOST_EXACT, Question, dense
 from nichechain.evolvability.record import draw_children, own_strength
+from nichechain.execution.side_by_side import side_by_side
 from nichechain.niches import Niches
-from nichechain.validation.rollouts import Lineages, niches_reached
+from nichechain.validation.rollouts import Lineages, OnDone, niches_reached
 from nichechain.validation.simulate import simulate_lineages
 
 if TYPE_CHECKING:
@@ -155,7 +156,13 @@ class DirectCheck:
 
 
 def compare(
-    chain: NicheChain, lineages: Lineages, niches: Niches, *, draws: int = DRAWS, seed: int = 0
+    chain: NicheChain,
+    lineages: Lineages,
+    niches: Niches,
+    *,
+    draws: int = DRAWS,
+    seed: int = 0,
+    on_done: OnDone | None = None,
 ) -> DirectCheck:
     """Predict what the lineages reached, without looking at them.
 
@@ -171,6 +178,8 @@ def compare(
     draws : int
         Draws of T, where the chain has a posterior.
     seed : int
+    on_done : callable, optional
+        Told how many more draws are done.
 
     Returns
     -------
@@ -186,23 +195,25 @@ def compare(
     n = chain.n_niches
     counts = np.stack([np.bincount(row[row != NONE], minlength=chain.states) for row in lineages.offspring])
     strength = own_strength(chain)
-    values: list[Floats] = []
-    simulated: list[Ints] = []
-    for number, drawn in enumerate(question.samples(chain, redraw=True)):
+
+    def predicted(number: int) -> tuple[Floats, Ints]:
+        drawn = question.sample(chain, number)
         matrix, rows = drawn.onward, dense(drawn.children(lineages.roots))
         rng = keyed(seed, Purpose.FIRST_GENERATION, number)
         first = np.concatenate([rows, draw_children(counts, rows, rng, strength)])
         rng = keyed(seed, Purpose.PREDICTION, number)
         begin = RowSampler(first).draw(np.tile(np.repeat(np.arange(2 * roots), size), _REPLICAS), rng)
         walks = simulate_lineages(matrix, begin.reshape(-1, size), generations, rng)
-        simulated.append(niches_reached(walks, n).reshape(_REPLICAS, 2 * roots, generations))
-        if chain.states <= MOST_EXACT:
-            none = np.zeros(len(first), np.int64)
-            found = coverage_by_generation(matrix, none, generations, [size], n, first=first)
-            values.append(found[:, :, 0])
-        else:
+        reached = niches_reached(walks, n).reshape(_REPLICAS, 2 * roots, generations)
+        if chain.states > MOST_EXACT:
             # The error of so many replicas is small beside that of the lineages really run.
-            values.append(simulated[-1].mean(axis=0))
+            return reached.mean(axis=0), reached
+        none = np.zeros(len(first), np.int64)
+        found = coverage_by_generation(matrix, none, generations, [size], n, first=first)
+        return found[:, :, 0], reached
+
+    # A T that is given is walked by as often as one that is drawn.
+    values, simulated = zip(*side_by_side(predicted, range(question.draws), on_done), strict=True)
     value = np.mean(values, axis=0)
     spread = np.moveaxis(np.concatenate(simulated), 0, 2).astype(np.float64)
     middle = spread.mean(axis=2, keepdims=True)

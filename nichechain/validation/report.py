@@ -117,6 +117,7 @@ def validate(
     *,
     on_done: OnDone | None = None,
     on_permuted: OnDone | None = None,
+    on_drawn: OnDone | None = None,
 ) -> Validation:
     """Test whether births are a chain's, and check the chain's predictions on real lineages.
 
@@ -128,8 +129,8 @@ def validate(
     config : ValidationConfig, optional
     on_done : callable, optional
         Told how many more genotypes have been evaluated.
-    on_permuted : callable, optional
-        Told how many more permutations are done.
+    on_permuted, on_drawn : callable, optional
+        Told how many more permutations, and draws of T, are done.
 
     Returns
     -------
@@ -169,7 +170,7 @@ def validate(
         tests += chapman_kolmogorov.lineages_test(
             lineages.walks, permutations=config.permutations, seed=config.seed, on_done=on_permuted
         )
-    direct = compare(chain, lineages, archive.niches, seed=config.seed)
+    direct = compare(chain, lineages, archive.niches, seed=config.seed, on_done=on_drawn)
     return Validation(config, archive.meta.births, tuple(tests), direct)
 
 
