@@ -228,10 +228,9 @@ def _course(command: EstimateCommand, archive: Archive) -> LevelCourse | None:
     if command.steps is not None or archive.niches.states > MOST_EXACT:
         return None
     births = archive.table()
-    posterior = archive.chain().posterior
-    law = None if posterior is None else posterior.law
+    like = archive.chain().posterior
     try:
-        return level_course(births, archive.niches, seed=command.seed, law=law)
+        return level_course(births, archive.niches, seed=command.seed, like=like)
     except NichechainError:
         return None
 

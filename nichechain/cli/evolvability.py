@@ -253,10 +253,9 @@ def _drift(command: EvolvabilityCommand, archive: Archive, chain: NicheChain) ->
     if command.steps is not None or command.format != "table" or archive.niches.states > MOST_EXACT:
         return ""
     births = archive.table()
-    law = None if chain.posterior is None else chain.posterior.law
     asked = {"l": command.l, "lineages": command.lineages, "seed": command.seed}
     try:
-        found = level_drift(births, archive.niches, **asked, law=law)
+        found = level_drift(births, archive.niches, **asked, like=chain.posterior)
     except NichechainError:
         # Too few births to say so, or births without a step.
         return ""

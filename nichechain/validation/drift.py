@@ -18,9 +18,10 @@ from scipy.special import stdtrit
 
 from nichechain.births.table import LINEAGE, check_columns
 from nichechain.chain.counts import TransitionCounts
-from nichechain.chain.estimators import estimate, with_posterior
+from nichechain.chain.estimators import with_posterior
 from nichechain.chain.filters import counts_of
-from nichechain.chain.lineages import LineageLaw
+from nichechain.chain.posterior import DirichletPosterior
+from nichechain.chain.prior import fit_prior
 from nichechain.core.checks import check_at_least
 from nichechain.core.errors import NichechainError
 from nichechain.core.randomness import Purpose, keyed
@@ -146,7 +147,7 @@ def level_drift(
     min_births: int = _MIN_BIRTHS,
     draws: int = 5,
     seed: int = 0,
-    law: LineageLaw | None = None,
+    like: DirichletPosterior | None = None,
 ) -> LevelDrift:
     """Compare the level by early births with that by late ones, cheaply.
 
@@ -161,8 +162,10 @@ def level_drift(
     draws : int
         Posterior draws of T of each half, at least 2.
     seed : int
-    law : LineageLaw, optional
-        What lineages do by either T, such as ``chain.posterior.law`` of all births.
+    like : DirichletPosterior, optional
+        Of all births, ``chain.posterior``: how much each guess of the base counts, its strength and what
+        lineages do are taken from there, so that either half differs in its births alone. By default
+        they are fitted to each half, without what lineages do.
 
     Returns
     -------
@@ -184,7 +187,7 @@ def level_drift(
     check_at_least(2, draws=draws)
     halves, _ = _parts(births, niches, 2)
     compared = _observed(halves, min_births)
-    early, late = (_levels(half, compared, question, number, law) for number, half in enumerate(halves))
+    early, late = (_levels(half, compared, question, number, like) for number, half in enumerate(halves))
     difference = float(late.mean() - early.mean())
     spread = np.sqrt((early.var(ddof=1) + late.var(ddof=1)) * (1.0 + 1.0 / draws))
     width = float(stdtrit(2 * (draws - 1), 0.5 + _LEVEL / 2) * spread)
@@ -210,13 +213,13 @@ def level_course(
     min_births: int = _MIN_BIRTHS,
     draws: int = 8,
     seed: int = 0,
-    law: LineageLaw | None = None,
+    like: DirichletPosterior | None = None,
 ) -> LevelCourse:
     """Level against steps, and against the number of births.
 
     Parameters
     ----------
-    births, niches, l, lineages, seed, law
+    births, niches, l, lineages, seed, like
         As in :func:`level_drift`.
     parts : int
         Parts of equally many births, at least 2.
@@ -244,7 +247,7 @@ def level_course(
     rows = []
     for number, (own, so_far) in enumerate(zip(counts, grown, strict=True)):
         levels = [
-            _levels(some, compared, question, 2 * number + k, law) for k, some in enumerate((own, so_far))
+            _levels(some, compared, question, 2 * number + k, like) for k, some in enumerate((own, so_far))
         ]
         rows.append([_interval(x) for x in levels])
     (level, low, high), (grown_level, grown_low, grown_high) = np.moveaxis(np.array(rows), 0, 2)
@@ -309,14 +312,20 @@ def _observed(counts: list[TransitionCounts], min_births: int) -> Ints:
 
 
 def _levels(
-    counts: TransitionCounts, compared: Ints, question: Question, number: int, law: LineageLaw | None
+    counts: TransitionCounts,
+    compared: Ints,
+    question: Question,
+    number: int,
+    like: DirichletPosterior | None,
 ) -> Floats:
     """Mean l-evolvability over niches, by each draw of T, (draws,)."""
-    posterior = estimate(counts).posterior
-    assert posterior is not None
-    # What is not known of the law is the same for all parts, so that none of it tells them apart.
-    known = None if law is None else law.taken_as_known()
-    chain = with_posterior(counts, replace(posterior, law=known), "early or late")
+    known = None if like is None else like.prior
+    prior = fit_prior(counts) if known is None else fit_prior(counts, known.strength, known.weights)
+    posterior = DirichletPosterior(counts, prior.base, prior.strength, prior.design_effect, prior)
+    if like is not None and like.law is not None:
+        # What is not known of the law is the same for all parts, so that none of it tells them apart.
+        posterior = replace(posterior, law=like.law.taken_as_known())
+    chain = with_posterior(counts, posterior, "early or late")
     # Draws of their own: parts must not agree for having been drawn alike.
     seed = int(keyed(question.seed, Purpose.RESAMPLING, number).integers(2**31))
     question = replace(question, seed=seed)

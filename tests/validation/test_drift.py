@@ -1,11 +1,15 @@
 """The level of early and late births: the same where nothing drifts, apart where steps grow."""
 
+from dataclasses import replace
+
 import numpy as np
 import pyarrow as pa
 import pytest
 
 from nichechain import GridNiches, NichechainError
 from nichechain.births.table import schema
+from nichechain.chain.estimators import estimate
+from nichechain.chain.filters import counts_of
 from nichechain.validation.drift import level_course, level_drift
 
 GRID = GridNiches((4, 4), ((0.0, 1.0), (0.0, 1.0)), "clip")
@@ -51,6 +55,18 @@ def test_wider_steps_are_found_out():
     assert (found.births, found.niches) == ((1500, 1500), 16)
     assert f"{found.early:.1f} by the first half" in found.answer
     assert "disagree" in found.answer
+
+
+def test_parts_borrow_the_prior_of_all_births():
+    """With a strength that no births would give, both halves are next to the base."""
+    table = births([2, 6], 0)
+    like = estimate(counts_of(table, GRID)).posterior
+    found = level_drift(table, GRID, **OPTIONS, like=like)
+    assert found.early == pytest.approx(exact(2), rel=0.05)
+    assert found.late == pytest.approx(exact(6), rel=0.05)
+    strong = replace(like.prior, strength=1e6, weights=np.eye(like.prior.kinds.number)[-1])
+    uniform = level_drift(table, GRID, **OPTIONS, like=replace(like, prior=strong))
+    assert uniform.early == pytest.approx(exact(16), rel=0.05)
 
 
 def test_births_are_put_in_the_order_of_their_steps():
