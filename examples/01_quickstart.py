@@ -18,7 +18,7 @@ print(chain)
 
 # Which niches will reach the most others within five generations?
 scores = nc.niche_evolvability(chain, l=5, lineages=100)
-print(scores.ranking(chain, min_births=20)[["index", "value", "low", "high", "births"]].head())
+print(scores.ranking(chain, min_births=20)[["index", "value", "low", "high", "births"]].head().round(1))
 
 # One niche, by its grid index: exact for every posterior draw of the chain, then averaged.
 best = int(scores.ranking(chain).loc[0, "niche"])

@@ -50,7 +50,7 @@ with tempfile.TemporaryDirectory() as folder:
     # A lineage of this chain is born from emitter to emitter, as often as the search used each.
     chain = found.chain()
     scores = nc.niche_evolvability(chain, l=5, lineages=100)
-    print(scores.ranking(chain)[["index", "value", "low", "high", "births"]].head())
+    print(scores.ranking(chain)[["index", "value", "low", "high", "births"]].head().round(1))
 
     figure = Figure(figsize=(13.5, 6))
     left, right = figure.subplots(1, 2, gridspec_kw={"wspace": 0.4})

@@ -45,7 +45,7 @@ with tempfile.TemporaryDirectory() as folder:
 
     chain = found.chain()
     scores = nc.niche_evolvability(chain, l=5, lineages=100)
-    print(scores.ranking(chain)[["index", "value", "low", "high", "births"]].head())
+    print(scores.ranking(chain)[["index", "value", "low", "high", "births"]].head().round(1))
 
     figure = Figure(figsize=(7.5, 6))
     plots.plot_evolvability(found, scores, figure.subplots())

@@ -120,7 +120,8 @@ def test_what_needs_a_library_names_it(words, package, tmp_path):
     done = run(f"from nichechain.cli import main; sys.exit(main({words!r}))", tmp_path)
     assert done.returncode == 2
     assert f"needs {package}, which is not installed: pip install {package}" in done.stderr
-    assert done.stderr.count("\n") == 1
+    # On a busy machine it may first say what it waits for.
+    assert len([line for line in done.stderr.splitlines() if line.startswith("nichechain: ")]) == 1
 
 
 def test_the_docs_list_what_is_left_to_install():

@@ -90,7 +90,9 @@ def _run(given: Sequence[str]) -> int:
     except NichechainError as error:
         if debug:
             raise
-        return _fail(str(error))
+        from nichechain.cli import refusals
+
+        return _fail(refusals.of_options(str(error), words))
     except ModuleNotFoundError as error:
         if debug or (error.name or "").startswith("nichechain"):
             raise

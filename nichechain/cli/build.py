@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar
 import tyro
 
 from nichechain.cli import output, parsing, progress, workers
-from nichechain.core.checks import DomainOption, StepBound, shown
+from nichechain.core.checks import DomainOption, StepBound, check_at_least, shown
 from nichechain.core.errors import NichechainError
 from nichechain.search.config import MOST_FAILED, BuildConfig, ObjectiveName, SearchConfig
 
@@ -157,6 +157,7 @@ class BuildCommand(SearchConfig):
             raise NichechainError(
                 f"--grid {self.grid} and --niches {self.niches} exclude each other: choose one"
             )
+        check_at_least(0, **{"--domain-seed": self.domain_seed})
         options = self.domain_options()
         domain = domains.make(self.domain, seed=self.domain_seed, **options)
         bounds = domain.bounds

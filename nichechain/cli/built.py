@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from nichechain.cli import output
+from nichechain.core.text import some
 from nichechain.search.config import BuildConfig, parse_selection
 
 if TYPE_CHECKING:
@@ -75,8 +76,8 @@ def report(folder: Path, shown: Console) -> None:
         for row in ranking.itertuples():
             top.add_row(row.index, f"{row.value:.1f}", f"{row.low:.1f} to {row.high:.1f}", str(row.births))
         shown.print(
-            f"\n[bold]Top niches by l-evolvability[/]  (l = {scores.l}, {scores.lineages} lineages, "
-            f"{scores.convention}, {scores.estimator})"
+            f"\n[bold]Top niches by l-evolvability:[/] how many niches {some(scores.lineages, 'lineage')} of "
+            f"{some(scores.l, 'generation')} reach"
         )
         shown.print(top)
     elif roots.size:

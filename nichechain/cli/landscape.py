@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from nichechain.cli import output, parsing, progress, workers
 from nichechain.core.checks import check_at_least
 from nichechain.core.errors import NichechainError
+from nichechain.core.text import rounded
 from nichechain.search.config import BuildConfig, MutationName
 
 if TYPE_CHECKING:
@@ -79,7 +80,7 @@ def run(arguments: Sequence[str]) -> int:
     from nichechain.search.making import make_mutation
     from nichechain.variation import SelfAdaptiveDomain
 
-    check_sample_size(command.offspring)
+    check_sample_size(command.offspring, "--offspring")
     Question(command.l, command.lineages)
     check_at_least(0, **{"--top": command.top, "--min-births": command.min_births})
     by = find_measure(command.by)
@@ -299,10 +300,21 @@ def _show(
                 flag,
             )
         shown.print(table)
-    compared = summary["l_evolvability"]
-    table = output.table(
-        "measure", "Spearman", "p", "n", title=f"With {compared['l']}-evolvability of the niche"
-    )
+    _show_correlations(summary["l_evolvability"])
+
+
+def _show_correlations(compared: dict[str, Any]) -> None:
+    """Measures beside l-evolvability; in one sentence where there is nothing to compare."""
+    from nichechain.landscape import MEASURES
+
+    shown = output.console()
+    of, births = f"{compared['l']}-evolvability", compared["min_births"]
+    rhos = [entry["rho"] for entry in compared["spearman"]]
+    needed = f"three elites that differ, in niches of {births} births or more"
+    if all(rho is None for rho in rhos):
+        shown.print(f"No rank correlation with {of} of the niche: it needs {needed}.")
+        return
+    table = output.table("measure", "Spearman", "p", "n", title=f"Rank correlation with {of} of the niche")
     for entry in compared["spearman"]:
         p_value = "-" if entry["p_value"] is None else f"{entry['p_value']:.2g}"
         measure = MEASURES[entry["measure"]]
@@ -310,8 +322,10 @@ def _show(
     shown.print(table)
     shown.print(
         f"[dim]{compared['lineages']} lineages; convention: {compared['convention']}; estimator: "
-        f"{compared['estimator']}; niches of {compared['min_births']} births or more[/]"
+        f"{compared['estimator']}; niches of {births} births or more[/]"
     )
+    if None in rhos:
+        shown.print(f"[dim]-: none, which needs {needed}[/]")
     if compared["saturated"]:
         shown.print(
             "Nearly all niches that can be reached are: fewer --lineages would tell niches apart better."
@@ -319,7 +333,7 @@ def _show(
 
 
 def _number(value: float | None) -> str:
-    return "-" if value is None or value != value else f"{value:.3g}"
+    return "-" if value is None or value != value else rounded(value)
 
 
 def _finite(value: float) -> float | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -17,8 +18,8 @@ if TYPE_CHECKING:
     from nichechain.archive.filling import BuildProgress
     from nichechain.chain import NicheChain
 
-# Seconds between progress lines where there is no terminal to redraw.
-_LINE_EVERY = 10.0
+# Where there is no terminal to redraw: seconds before the first line, and between lines.
+_FIRST_LINE, _LINE_EVERY = 2.0, 10.0
 
 
 _QUIET = ContextVar("quiet", default=False)
@@ -42,9 +43,22 @@ def leave_at_next_interrupt() -> None:
     signal.signal(signal.SIGINT, lambda *_: os._exit(130))
 
 
-def spinner(text: str) -> Any:
-    """Something that turns while a thing is loaded; nothing where there is no terminal."""
-    return _console().status(text)
+@contextmanager
+def spinner(text: str) -> Iterator[None]:
+    """Something that turns while a thing is done; one line where there is no terminal and it takes long."""
+    shown = _console()
+    if shown.is_terminal:
+        with shown.status(text):
+            yield
+        return
+    line = threading.Timer(_FIRST_LINE, _say, [text])
+    line.daemon = True
+    if not _QUIET.get():
+        line.start()
+    try:
+        yield
+    finally:
+        line.cancel()
 
 
 def estimated(archive: Archive, estimator: str = "empirical-bayes", **options: Any) -> NicheChain:
@@ -226,13 +240,14 @@ class _Lines:
     """When the next line may be written."""
 
     def __init__(self) -> None:
-        self._last = time.monotonic()
+        self._next = time.monotonic() + _FIRST_LINE
 
     def due(self) -> bool:
         """Whether it may now; the next one then waits its time."""
-        if time.monotonic() - self._last < _LINE_EVERY:
+        now = time.monotonic()
+        if now < self._next:
             return False
-        self._last = time.monotonic()
+        self._next = now + _LINE_EVERY
         return True
 
 

@@ -1,4 +1,4 @@
-"""What the parser of options refuses, said as nichechain says everything else: in one sentence."""
+"""What the parser of options refuses, in one sentence, and what the library does, in words of options."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import io
 import os
 import re
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
 from nichechain.core.checks import shown
@@ -25,6 +25,7 @@ _UNION = re.compile(
 )
 _WORD = re.compile(r"Error parsing (?P<name>\S+): (?P<why>.*?)(?P<value>'.*')\.?$")
 _MISSING = re.compile(r"Missing value for argument '(?P<name>.*)'")
+_PARAMETER = re.compile(r"[a-z]\w*(?= is )")
 _KINDS = {"INT": "a whole number", "FLOAT": "a number", "PATH": "a path"}
 
 
@@ -60,6 +61,26 @@ def in_one_sentence(name: str) -> Iterator[None]:
         else:
             os.environ["COLUMNS"] = columns
         sys.stderr.write(said.getvalue())
+
+
+def of_options(refusal: str, words: Sequence[str]) -> str:
+    """What the library says of a parameter, said of the option that gave it.
+
+    Parameters
+    ----------
+    refusal : str
+        Such as ``elites is 2, but must be at least 3``; of one of several, such as ``level is 'hard'``, the
+        option has the plural.
+    words : sequence of str
+        Of the command line.
+    """
+    named = _PARAMETER.match(refusal)
+    if named is None:
+        return refusal
+    given = {word.partition("=")[0] for word in words}
+    option = f"--{named[0].replace('_', '-')}"
+    found = next((each for each in (option, f"{option}s") if each in given), named[0])
+    return found + refusal[named.end() :]
 
 
 def sentence(framed: str, name: str) -> str | None:

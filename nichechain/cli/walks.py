@@ -12,8 +12,9 @@ import tyro
 
 from nichechain.cli import output, parsing, progress, workers
 from nichechain.cli.begun import ReportCommand, ResumeCommand, stopped
-from nichechain.core.checks import shown
+from nichechain.core.checks import check_at_least, shown
 from nichechain.core.errors import NichechainError
+from nichechain.core.text import rounded
 from nichechain.studies.settings import MetricName, WalkSettings
 
 if TYPE_CHECKING:
@@ -212,6 +213,7 @@ def run(arguments: Sequence[str]) -> int:
 def _begin(command: _Study, kind: Kind) -> int:
     from nichechain import domains
 
+    check_at_least(0, **{"--domain-seed": command.domain_seed})
     options = parsing.domain_options(command.options)
     domain = domains.make(command.domain, seed=command.domain_seed, **options)
     return _walk(_study(command, kind, domain, options), domain, command.out, command)
@@ -278,12 +280,12 @@ def _means(analysis: Analysis, unit: str) -> Table:
     made = output.table("condition", "runs", f"mean {said} at step {analysis.last} ({unit})", "95 % interval")
     for summary in analysis.summaries:
         if summary.measure == analysis.main and summary.step == analysis.last:
-            interval = f"{summary.low:.3g} to {summary.high:.3g}"
-            made.add_row(summary.condition, str(summary.n), f"{summary.mean:.3g}", interval)
+            interval = f"{rounded(summary.low)} to {rounded(summary.high)}"
+            made.add_row(summary.condition, str(summary.n), rounded(summary.mean), interval)
     for asked in analysis.asked:
         if asked.test and asked.measure == analysis.main and asked.step == analysis.last:
             test = asked.test
-            made.caption = f"{test.name}: {test.symbol} = {test.statistic:.3g}, p = {test.p:.2g}"
+            made.caption = f"{test.name}: {test.symbol} = {rounded(test.statistic)}, p = {test.p:.2g}"
     return made
 
 

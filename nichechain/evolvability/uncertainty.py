@@ -25,6 +25,7 @@ from nichechain.core.checks import check_at_least, check_numbers
 from nichechain.core.errors import NichechainError
 from nichechain.core.intervals import drawn_interval
 from nichechain.core.randomness import Purpose, keyed
+from nichechain.core.text import rounded
 from nichechain.evolvability.niches import answer_for_niches
 from nichechain.evolvability.question import DRAWS, Convention, Question, told
 
@@ -208,4 +209,5 @@ def _only(base: BaseMeasure, weights: Floats) -> BaseMeasure:
 
 
 def _chain(posterior: DirichletPosterior) -> NicheChain:
-    return with_posterior(posterior.counts, posterior, f"empirical-bayes, strength {posterior.strength:.3g}")
+    name = f"empirical-bayes, strength {rounded(posterior.strength)}"
+    return with_posterior(posterior.counts, posterior, name)

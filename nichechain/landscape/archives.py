@@ -283,7 +283,7 @@ def measure_archive(
         If a number is out of range, the archive has no elites, one of them fails to evaluate, or
         the file does not fit.
     """
-    check_sample_size(offspring)
+    check_sample_size(offspring, "offspring")
     check_seed(seed)
     check_share(share=share)
     if elites is not None:

@@ -206,15 +206,21 @@ def measure_behaviors(
     )
 
 
-def check_sample_size(size: int) -> None:
+def check_sample_size(size: int, name: str = "sample_size") -> None:
     """Refuse a sample too small for evolvability.
+
+    Parameters
+    ----------
+    size : int
+    name : str, optional
+        What the caller knows it by.
 
     Raises
     ------
     NichechainError
         If it is below 2.
     """
-    check_at_least(2, sample_size=size)
+    check_at_least(2, **{name: size})
 
 
 def _joined(parts: list[Floats]) -> Floats:

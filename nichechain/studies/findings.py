@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from nichechain.core.text import rounded
 from nichechain.studies import paper
 from nichechain.studies.analysis import Analysis, Asked
 from nichechain.studies.results import Effect, Interval
@@ -62,16 +63,11 @@ def find(analysis: Analysis) -> tuple[Finding, ...]:
     return ()
 
 
-def number(value: float) -> str:
-    """A number with three digits that count."""
-    return f"{value:.3g}"
-
-
 def with_interval(effect: Effect) -> str:
     """The value of an effect with its interval."""
     if effect.interval is None:
-        return number(effect.value)
-    return f"{number(effect.value)} [{number(effect.interval.low)}, {number(effect.interval.high)}]"
+        return rounded(effect.value)
+    return f"{rounded(effect.value)} [{rounded(effect.interval.low)}, {rounded(effect.interval.high)}]"
 
 
 def _pressure(analysis: Analysis) -> tuple[Finding, ...]:
@@ -108,7 +104,7 @@ def _trend(analysis: Analysis, step: int) -> Finding:
     if asked.test is None:
         return Finding(claim, its, f"no test: {asked.reason}", OPEN)
     test = asked.test
-    ours = f"r = {with_interval(test.effect)}, p = {number(test.p)}, n = {test.n}"
+    ours = f"r = {with_interval(test.effect)}, p = {rounded(test.p)}, n = {test.n}"
     missing = _missing(analysis)
     if missing:
         return Finding(claim, its, f"{ours}; without {', '.join(missing)}", OPEN)
@@ -124,7 +120,7 @@ def _change(claim: str, its: str, asked: Asked | None, sign: int, step: int) -> 
         return Finding(claim, its, f"no test: {reason}", OPEN)
     interval = asked.test.effect.interval
     assert interval is not None
-    ours = f"{with_interval(asked.test.effect)}, p = {number(asked.test.p)}, n = {asked.test.n}"
+    ours = f"{with_interval(asked.test.effect)}, p = {rounded(asked.test.p)}, n = {asked.test.n}"
     return Finding(claim, its, ours, {sign: REPRODUCED, -sign: OPPOSITE, 0: NOT_FOUND}[_side(interval)])
 
 
@@ -156,7 +152,7 @@ def _same_start(asked: Asked, missing: list[str]) -> Finding:
     claim = "Walks start from about the same mean evolvability (step 0)"
     if asked.test is None:
         return Finding(claim, "approximately the same", f"no test: {asked.reason}", OPEN)
-    ours = f"{asked.test.name}: p = {number(asked.test.p)}, n = {asked.test.n}"
+    ours = f"{asked.test.name}: p = {rounded(asked.test.p)}, n = {asked.test.n}"
     if missing:
         return Finding(claim, "approximately the same", f"{ours}; without {', '.join(missing)}", OPEN)
     return Finding(claim, "approximately the same", ours, DIFFERS if asked.test.p < ALPHA else AGREES)
@@ -176,7 +172,7 @@ def _metrics(analysis: Analysis, step: int) -> list[Finding]:
     assert groups is not None
     test = groups.test
     ours = (
-        f"{test.name} p = {number(test.p)}, {test.symbol} = {number(test.statistic)}, "
+        f"{test.name} p = {rounded(test.p)}, {test.symbol} = {rounded(test.statistic)}, "
         f"{test.effect.name} = {with_interval(test.effect)}, n = {test.n}"
     )
     if len(asked.conditions) < len(paper.METRICS):
@@ -193,15 +189,15 @@ def _metrics(analysis: Analysis, step: int) -> list[Finding]:
         found.append(
             Finding(
                 f"{pair.first} against {pair.second} ({at})",
-                f"p = {number(p) if p == 1 else p}, {its_step}",
-                f"p = {number(pair.p)}, {pair.effect.name} = {with_interval(pair.effect)}",
+                f"p = {rounded(p) if p == 1 else p}, {its_step}",
+                f"p = {rounded(pair.p)}, {pair.effect.name} = {with_interval(pair.effect)}",
                 _pair_verdict(p < ALPHA, pair.p < ALPHA, kde_leads),
             )
         )
     if len(asked.conditions) == len(paper.METRICS):
         means = {label: analysis.summary(label, step).mean for label in asked.conditions}
         best, worst = max(means, key=means.__getitem__), min(means, key=means.__getitem__)
-        listed = ", ".join(f"{label} {number(mean)}" for label, mean in means.items())
+        listed = ", ".join(f"{label} {rounded(mean)}" for label, mean in means.items())
         for wanted, got, claim in (
             ("kde", best, "KDE dominates (largest mean η*)"),
             ("knn-no-archive", worst, "kNN without archive is lowest (smallest mean η*)"),

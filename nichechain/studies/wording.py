@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Iterator
 
 from nichechain.core.intervals import LEVEL
+from nichechain.core.text import rounded
 from nichechain.landscape import QUANTILES
 from nichechain.studies import findings, paper
 from nichechain.studies.analysis import MAIN, POPULATION, Analysis, Asked, Summary, tested, varied
@@ -21,7 +22,7 @@ from nichechain.studies.document import (
     Picture,
     Table,
 )
-from nichechain.studies.findings import number, with_interval
+from nichechain.studies.findings import with_interval
 
 _LEVEL = f"{100 * LEVEL:.0f} %"
 _TITLES = {
@@ -188,8 +189,8 @@ def _means(analysis: Analysis, unit: str) -> Iterator[Block]:
 
 def _mean(summary: Summary) -> str:
     if not summary.low < summary.high:
-        return number(summary.mean)
-    return f"{number(summary.mean)} [{number(summary.low)}, {number(summary.high)}]"
+        return rounded(summary.mean)
+    return f"{rounded(summary.mean)} [{rounded(summary.low)}, {rounded(summary.high)}]"
 
 
 def _tests(analysis: Analysis) -> Iterator[Block]:
@@ -213,7 +214,7 @@ def _tests(analysis: Analysis) -> Iterator[Block]:
             f"pair alone. Mean ranks, 1 for the smallest: {names}.",
             ("Pair", "p", a.groups.pairs[0].effect.name),
             tuple(
-                (f"{pair.first} against {pair.second}", number(pair.p), with_interval(pair.effect))
+                (f"{pair.first} against {pair.second}", rounded(pair.p), with_interval(pair.effect))
                 for pair in a.groups.pairs
             ),
         )
@@ -232,8 +233,8 @@ def _test_row(analysis: Analysis, asked: Asked) -> tuple[str, ...]:
     return (
         *said,
         test.name,
-        f"{test.symbol} = {number(test.statistic)}",
-        number(test.p),
+        f"{test.symbol} = {rounded(test.statistic)}",
+        rounded(test.p),
         str(test.n),
         f"{test.effect.name} = {with_interval(test.effect)}",
     )
@@ -271,14 +272,14 @@ def _dissimila(analysis: Analysis) -> Iterator[Block]:
     yield Table(
         "Quantiles of r* over the states that are not neutral.",
         ("Condition", *(f"{q:.0%}" for q in QUANTILES)),
-        tuple((label, *map(number, values)) for label, values in study.quantiles.items()),
+        tuple((label, *map(rounded, values)) for label, values in study.quantiles.items()),
     )
 
 
 def _relation(relation: Relation) -> str:
     if relation.test is None or relation.adjusted is None:
         return f"no test: {relation.reason}"
-    return f"{with_interval(relation.test.effect)}, p = {number(relation.adjusted)}, n = {relation.test.n}"
+    return f"{with_interval(relation.test.effect)}, p = {rounded(relation.adjusted)}, n = {relation.test.n}"
 
 
 def _deception(analysis: Analysis) -> str:
@@ -289,7 +290,7 @@ def _deception(analysis: Analysis) -> str:
     if relation.test is None or relation.adjusted is None:
         return f"Whether they do cannot be said yet: {relation.reason}."
     held = f"At equal η* now, over all runs the median correlation is {with_interval(relation.test.effect)}"
-    held += f" (p = {number(relation.adjusted)})"
+    held += f" (p = {rounded(relation.adjusted)})"
     if relation.adjusted >= findings.ALPHA:
         return f"{held}: no sign that low-r* points hold walks back, or help them."
     if relation.test.effect.value > 0:

@@ -60,6 +60,15 @@ def test_rows_and_summary_as_json(built, capsys):
     assert found["archive"] == "arm"
 
 
+def test_few_elites_have_no_rank_correlation_and_it_says_why(built, capsys):
+    assert landscape.run([str(built), *QUICK, "--elites", "2", "--map", "none"]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert "No rank correlation with 5-evolvability of the niche: it needs three elites that differ" in said
+    assert "Spearman" not in said
+    assert landscape.run([str(built), *QUICK, "--min-births", "1", "--map", "none"]) == 0
+    assert "Rank correlation with 5-evolvability of the niche" in capsys.readouterr().out
+
+
 def test_another_operator_is_the_one_that_is_measured_with(built, capsys):
     options = ["--mutation", "gaussian", "--scale", "0.02", "--step-bound", "rescaled:0.01"]
     assert landscape.run([str(built), *QUICK, *options, "--json", "--map", "none"]) == 0
@@ -108,7 +117,7 @@ def test_goes_on_after_an_interruption_to_the_same_bytes(built, tmp_path, monkey
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        (["--offspring", "1"], "sample_size is 1, but must be at least 2"),
+        (["--offspring", "1"], "--offspring is 1, but must be at least 2"),
         (["--elites", "0"], "elites is 0"),
         (["--share", "2"], "share is 2"),
         (["--seed", "-1"], "seed is -1"),

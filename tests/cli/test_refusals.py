@@ -3,7 +3,7 @@
 import pytest
 
 from nichechain.cli import main, parsing
-from nichechain.cli.refusals import sentence
+from nichechain.cli.refusals import of_options, sentence
 
 SAID = {
     "plot a wormhole": "kind is 'wormhole', but must be one of elites, visits, ",
@@ -31,6 +31,29 @@ def test_one_sentence(line, said, capsys, monkeypatch, tmp_path):
     assert shown.err.startswith("nichechain: error: ")
     assert shown.err.count("\n") == 1
     assert said in shown.err
+
+
+def test_a_parameter_of_the_library_is_said_as_the_option_that_gave_it():
+    assert of_options("elites is 2, but", ["validate", "a", "--elites", "2"]) == "--elites is 2, but"
+    assert of_options("min_births is -1, but", ["table", "--min-births=-1"]) == "--min-births is -1, but"
+    assert of_options("level is 'hard', but", ["walks", "--levels", "hard"]) == "--levels is 'hard', but"
+    for other in ("elites is 2, but", "--elites is 2, but", "meta.json: elites is 2", "there is no x"):
+        assert of_options(other, ["validate", "a", "--elite", "2"]) == other
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    {
+        "validate {} --elites 2": "--elites is 2, but a rank correlation needs at least 3",
+        "landscape {} --elites 0": "--elites is 0, but must be at least 1",
+        "landscape {} --offspring 1": "--offspring is 1, but must be at least 2",
+        "evolvability {} --l 0": "--l is 0, but",
+        "build arm --seed 3 --domain-seed -1": "--domain-seed is -1, but",
+    }.items(),
+)
+def test_options_are_named_in_what_the_library_refuses(line, said, built, capsys):
+    assert main([str(built) if word == "{}" else word for word in line.split()]) == 2
+    assert capsys.readouterr().err.startswith(f"nichechain: error: {said}")
 
 
 def test_an_archive_of_ones_own(built, capsys):

@@ -120,6 +120,7 @@ def test_progress_lines_tell_rate_and_time_left(
 ) -> None:
     now = 0.0
     monkeypatch.setattr(progress.time, "monotonic", lambda: now)
+    monkeypatch.setattr(progress, "_FIRST_LINE", 10.0)
     with progress.stages() as tell:
         tell("evaluations", 0, 100)
         now = 11.0

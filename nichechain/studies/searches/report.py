@@ -13,6 +13,7 @@ import pyarrow as pa
 
 from nichechain.core.machine import library_versions
 from nichechain.core.parquet import parquet_bytes
+from nichechain.core.text import rounded
 from nichechain.studies.analysis import plain
 from nichechain.studies.document import (
     Bullets,
@@ -146,7 +147,7 @@ def worth_table(worths: tuple[Worth, ...]) -> Table:
             shown(worth.births_ratio, ".2f") if worth.selection != REFERENCE else "1",
             "" if math.isnan(worth.p) else f"{worth.p:.2g}",
             shown(worth.filled, ".0f"),
-            shown(worth.quality, ".3g"),
+            shown(worth.quality),
             shown(worth.offspring_niches, ".2f"),
         )
         for worth in worths
@@ -173,12 +174,16 @@ def _curiosity_table(worths: tuple[Worth, ...]) -> Table:
     return Table("Rank correlation of curiosity and 5-evolvability.", headings, tuple(rows))
 
 
-def shown(mean: Mean, form: str) -> str:
-    """A mean and its interval in some format, nothing where there is none."""
+def shown(mean: Mean, form: str | None = None) -> str:
+    """A mean and its interval in some format, by default with three digits; nothing where there is none."""
+
+    def text(value: float) -> str:
+        return rounded(value) if form is None else f"{value:{form}}"
+
     if math.isnan(mean.value):
         return ""
     low, high = mean.interval.low, mean.interval.high
-    return f"{mean.value:{form}}" + ("" if math.isnan(low) else f" ({low:{form}} to {high:{form}})")
+    return text(mean.value) + ("" if math.isnan(low) else f" ({text(low)} to {text(high)})")
 
 
 def _figure(study: SelectionStudy, worths: tuple[Worth, ...], records: pa.Table) -> Figure:
