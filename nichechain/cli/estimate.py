@@ -222,12 +222,13 @@ def _stability(command: EstimateCommand, archive: Archive) -> None:
 
 def _course(command: EstimateCommand, archive: Archive) -> LevelCourse | None:
     """Level against steps and births; None where births say no step or are too few, or niches too many."""
+    from nichechain.chain.filters import COUNTED
     from nichechain.evolvability.question import MOST_EXACT
     from nichechain.validation.drift import level_course
 
     if command.steps is not None or archive.niches.states > MOST_EXACT:
         return None
-    births = archive.table()
+    births = archive.table(list(COUNTED))
     like = archive.chain().posterior
     try:
         return level_course(births, archive.niches, seed=command.seed, like=like)

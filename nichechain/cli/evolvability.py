@@ -246,13 +246,14 @@ def _best(command: EvolvabilityCommand, chain: NicheChain) -> pd.DataFrame:
 
 def _drift(command: EvolvabilityCommand, archive: Archive, chain: NicheChain) -> str:
     """What to say where early and late births disagree on the level, else nothing."""
+    from nichechain.chain.filters import COUNTED
     from nichechain.evolvability.question import MOST_EXACT
     from nichechain.validation.drift import level_drift
 
     # Beyond, a level in closed form would take longer than what was asked for.
     if command.steps is not None or command.format != "table" or archive.niches.states > MOST_EXACT:
         return ""
-    births = archive.table()
+    births = archive.table(list(COUNTED))
     asked = {"l": command.l, "lineages": command.lineages, "seed": command.seed}
     try:
         found = level_drift(births, archive.niches, **asked, like=chain.posterior)
