@@ -24,7 +24,7 @@ from nichechain.search import savings
 from nichechain.search.bounds import FirstLook
 from nichechain.search.config import MOST_FAILED, BuildConfig
 from nichechain.search.failures import Failures, check_first_batch
-from nichechain.search.making import make_domain, make_mutation, make_niches
+from nichechain.search.making import check_niches, make_domain, make_mutation, make_niches
 from nichechain.search.map_elites import MapElites
 from nichechain.search.selection import Told, retrace
 from nichechain.steering import make_contests, make_selection
@@ -80,6 +80,8 @@ def build(
     given = domain
     domain = domain or make_domain(config)
     domain, mutate = make_mutation(config, domain)
+    # Before there is a folder, so that bad input leaves nothing behind.
+    check_niches(config)
     with writing(folder):
         state = None
         outside = 0

@@ -179,7 +179,7 @@ def plot_uncertainty(archive: Archive, scores: NicheEvolvability, ax: Axes | Non
     ax.set_title(
         f"Uncertainty: half of the intervals are under {np.median(width[births > 0]):.1f} niches wide"
     )
-    key(ax, note=f"{scores.estimator}; grey: never a parent")
+    key(ax, note=f"{scores.estimator}; light grey: never a parent")
     return ax
 
 

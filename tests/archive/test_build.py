@@ -324,6 +324,7 @@ def test_configurations_that_do_not_go_on(
         ({"scale": 0.0}, "scale is 0.0"),
         ({"shape": (9,)}, "grid has 1 axes but bounds have 2"),
         ({"shape": (9, 0)}, "every axis needs at least 1 cell"),
+        ({"shape": (65_536, 65_536)}, "at most 10000000 cells"),
         ({"bounds": ((0.0, 0.0), (0.0, 1.0))}, "bounds are 0 to 0"),
         ({"outside": "ignore"}, "outside is 'ignore'"),
         ({"shape": (3, 3, 3), "bounds": ((0.0, 1.0),) * 3}, r"behavior has shape \(50, 2\)"),
@@ -333,6 +334,8 @@ def test_configurations_that_cannot_begin(change: dict[str, Any], message: str, 
     with Threads(1) as executor, pytest.raises(NichechainError, match=message):
         build(replace(SHORT, **change), tmp_path / "archive", executor)
     assert not read.is_archive(tmp_path / "archive")
+    # What only the first births tell is known when there is a folder.
+    assert (tmp_path / "archive").exists() == (len(change.get("shape", ())) > 2)
 
 
 def test_domain_is_made_from_its_name(tmp_path: Path) -> None:
