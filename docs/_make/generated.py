@@ -72,8 +72,8 @@ def examples(root: Path) -> dict[str, str]:
         listed.append(f"| [`{path.name}`]({path.stem}.md) | {heading} |")
     table = "\n".join(["| script | what it does |", "|---|---|", *listed])
     made["examples/index.md"] = (
-        "# Examples\n\nNumbered scripts, each under a minute and each ending in a picture. "
-        f"They run anywhere and write to the current folder.\n\n{table}\n"
+        "# Examples\n\nNumbered scripts, each under a minute. All but that of a cluster end in a picture, "
+        f"which they write to the current folder.\n\n{table}\n"
     )
     return made
 

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from nichechain.execution import Executor
 
 FirstGeneration = Literal["posterior", "empirical"]
+"""What the first generation of a genotype's lineages is drawn from."""
 
 
 def genotype_evolvability(

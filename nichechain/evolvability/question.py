@@ -24,7 +24,9 @@ Item = TypeVar("Item")
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Method = Literal["auto", "exact", "monte-carlo"]
+"""How l-evolvability is computed."""
 Convention = Literal["definition", "procedure"]
+"""Whether the root's own state counts: it does by ``procedure``, not by ``definition``."""
 
 DRAWS = 50
 """Posterior draws of T that a value is averaged over."""

@@ -25,6 +25,7 @@ Where a state is asked for, the outside state is one as well: by its name, or it
 """
 
 OUTSIDE_MODES = ("state", "absorb", "clip")
+"""What may become of behaviors outside the bounds."""
 
 
 class Niches(ABC):

@@ -16,8 +16,10 @@ from nichechain.studies.conditions import Condition, pressure_of
 Kind = Literal["pressure", "metrics", "sensitivity", "population"]
 
 LEVELS = ("selective", "0.1", "0.25", "0.5", "0.75", "random")
+"""Levels of evolutionary pressure that are compared, the strongest first."""
 POPULATION_METRICS, POPULATION_SIZE = ("kde", "knn"), 10
 METRICS = ("kde", "knn", "knn-no-archive", "ancestors", "parent")
+"""Diversity metrics that are compared: the paper's four, and the distance to the parent."""
 
 VARIATIONS: dict[str, dict[str, Sequence[Any]]] = {
     "scale": {"scale": (0.01, 0.1, 1.0)},

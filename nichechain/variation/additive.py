@@ -18,6 +18,7 @@ Floats = NDArray[np.float64]
 Genotype = NDArray[Any]
 
 BOUND_KINDS: tuple[str, ...] = get_args(StepBound)
+"""How steps may be bounded: ``per-coordinate`` or ``rescaled``."""
 # Shortens a step a little below the bound, so that rounding does not bring it back to it.
 _BELOW = 1.0 - 1e-12
 

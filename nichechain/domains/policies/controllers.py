@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
 Float32s = NDArray[np.float32]
 Policy: TypeAlias = Callable[[ArrayLike], Float32s]
+"""From an observation to an action."""
 
 IDENTITY, RELU, TANH = 0, 1, 2
 _ACTIVATIONS = {"identity": IDENTITY, "relu": RELU, "tanh": TANH}
