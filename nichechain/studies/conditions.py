@@ -129,13 +129,12 @@ def selection_of(level: str) -> Selection:
     if level in named:
         return named[level]
     try:
-        fraction = float(level)
+        return TopFraction(float(level))
     except (TypeError, ValueError):
         raise NichechainError(
             f"level is {shown(level)}, "
             "but must be selective, better, random, or a fraction above 0 and at most 1"
         ) from None
-    return TopFraction(fraction)
 
 
 def pressure_of(level: str) -> float:

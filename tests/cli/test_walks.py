@@ -168,8 +168,8 @@ def test_help(capsys):
     [
         (["speed", "arm"], "there is no study 'speed'"),
         (["pressure", "moon"], "domain is 'moon'"),
-        (["pressure", "arm", "--levels", "0"], "fraction is 0.0"),
-        (["pressure", "arm", "--levels", "1.1"], "fraction is 1.1"),
+        (["pressure", "arm", "--levels", "0"], "--levels is '0'"),
+        (["pressure", "arm", "--levels", "1.1"], "--levels is '1.1'"),
         (["pressure", "arm", "--levels", "hard"], "--levels is 'hard'"),
         (["pressure", "arm", "--levels", "0.5,0.5"], "'0.5' is given twice"),
         (["pressure", "arm", "--levels", ","], "at least 1 condition"),

@@ -62,9 +62,9 @@ def test_seed_of_a_condition_depends_on_its_label_and_the_study_alone() -> None:
 @pytest.mark.parametrize(
     ("values", "message"),
     [
-        ({"level": "0"}, "fraction is 0.0"),
-        ({"level": "1.5"}, "fraction is 1.5"),
-        ({"level": "nan"}, "fraction is nan"),
+        ({"level": "0"}, "level is '0', but must be selective, better, random, or a fraction"),
+        ({"level": "1.5"}, "level is '1.5'"),
+        ({"level": "nan"}, "level is 'nan'"),
         ({"level": "hard"}, "level is 'hard'"),
         ({"metric": "euclid"}, "metric is 'euclid'"),
         ({"mode": "matrix"}, "mode is 'matrix'"),
