@@ -71,6 +71,7 @@ def evolvability_table(
     sizes = [int(size) for size in lineages]
     check_at_least(1, lineages=min(sizes))
     question = Question(longest, max(sizes), draws=draws, seed=seed)
+    question.warn_if_long(chain, chain.n_niches)
     if chain.posterior is not None and chain.states > MOST_EXACT:
         return _simulated(chain, longest, sizes, question, on_done)
 

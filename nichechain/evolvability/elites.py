@@ -91,6 +91,7 @@ def elite_evolvability(
         )
     strength = own_strength(chain) if strength is None else strength
     record = Record(recorded_children(archive, elites.uid), strength)
+    question.warn_if_long(chain, len(elites), question.number_of_samples(chain, redraw=True))
     if question.by_urns(chain):
         assert chain.posterior is not None
         found = simulated_coverage(

@@ -126,6 +126,7 @@ def genotype_evolvability(
 
     root = Root(chain, niche=elite.state)
     strength = own_strength(chain) if strength is None else strength
+    question.warn_if_long(chain, samples=question.number_of_samples(chain, redraw=True))
     if question.by_urns(chain):
         own = sparse.csr_array(counts[None])
         if guessed:

@@ -154,6 +154,7 @@ def answer_for_niches(
     *,
     roots: Ints | None = None,
     best: int | None = None,
+    announced: bool = False,
     on_done: Callable[[int], None] | None = None,
 ) -> NicheEvolvability:
     """What :func:`niche_evolvability` answers to a question that has been checked.
@@ -166,12 +167,15 @@ def answer_for_niches(
         The niches that are asked for, where not all: others have NaN.
     best : int, optional
         How many of the best are wanted, where not all: others may have NaN.
+    announced : bool
+        Whether it was said already how long it could take, as of one of many questions.
     on_done : callable, optional
         Told how many more draws of T are done.
     """
     n, lineages = chain.n_niches, question.lineages
     asked = np.arange(n) if roots is None else roots
-    question.warn_if_long(chain, asked.size)
+    if not announced:
+        question.warn_if_long(chain, asked.size)
     if question.by_urns(chain):
         return _by_urns(chain, question, asked, best, on_done)
     size = question.repeats_of_each(chain)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from typing import Literal, TypeVar, get_args
@@ -15,6 +14,7 @@ from scipy import sparse
 from nichechain.chain.lineages import scattered_rows
 from nichechain.chain.model import NicheChain, Transition
 from nichechain.core.checks import as_floats, check_at_least, check_choice, check_seed
+from nichechain.core.duration import warn_if_long
 from nichechain.core.errors import NichechainError
 from nichechain.core.randomness import Purpose, keyed
 from nichechain.niches import Niche
@@ -36,8 +36,7 @@ MOST_EXACT = 1_000
 # States whose elites' rows are drawn together: few generators, and little in vain for a single root.
 _TOGETHER = 16
 
-# Seconds of which whoever asks is told before, and what a processor does in one of them.
-_LONG = 600.0
+# What a processor does in a second.
 _MOVES_A_SECOND, _SUMS_A_SECOND = 4e6, 2e10
 # Lineages that are longer or more numerous cost more to simulate than their closed form.
 _LONGEST, _MOST_LINEAGES = 1_000, 10_000
@@ -179,12 +178,7 @@ class Question:
             # Longer ones are mostly over when nothing changes any more.
             products = samples * min(self.steps, _LONGEST)
             cost = 2.0 * products * entries * chain.n_niches / _SUMS_A_SECOND
-        if cost > _LONG:
-            warnings.warn(
-                f"this could take {cost / 60:.0f} minutes: "
-                "fewer roots, lineages, generations or draws take less",
-                stacklevel=3,
-            )
+        warn_if_long(cost, "fewer roots, lineages, generations or draws take less", stacklevel=4)
 
     def transitions(self, chain: NicheChain, *, redraw: bool = False) -> Iterator[Transition]:
         """T itself where it is given, draws from its posterior where it is estimated with one.

@@ -140,6 +140,7 @@ def reach(
     question = Question(l, lineages, convention, draws=draws, seed=seed)
     root = Root(chain, niche=niche, offspring=offspring)
     n = chain.n_niches
+    question.warn_if_long(chain)
     if question.by_urns(chain):
         assert chain.posterior is not None
         visit, passes, simulated = simulated_reach(

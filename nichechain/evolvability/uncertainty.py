@@ -122,8 +122,10 @@ def prior_sensitivity(
         "all destination": replace(given, base=_only(base, np.array([1.0 - rest, 0.0, rest]))),
         "all displacement": replace(given, base=_only(base, np.array([0.0, 1.0 - rest, rest]))),
     }
+    chain = _chain(fitted)
+    question.warn_if_long(chain, chain.n_niches, len(priors) * draws)
     fits = told((_chain(posterior) for posterior in priors.values()), on_done)
-    values = np.array([answer_for_niches(fit, question).value for fit in fits])
+    values = np.array([answer_for_niches(fit, question, announced=True).value for fit in fits])
     return NicheBand("prior sensitivity", values[0], values.min(axis=0), values.max(axis=0), tuple(priors))
 
 
@@ -187,13 +189,15 @@ def bootstrap_elites(
     fitted = estimate(counts).posterior
     assert fitted is not None
 
-    value = answer_for_niches(_chain(fitted), replace(question, draws=DRAWS)).value
+    chain = _chain(fitted)
+    question.warn_if_long(chain, chain.n_niches, DRAWS + resamples * draws)
+    value = answer_for_niches(chain, replace(question, draws=DRAWS), announced=True).value
     families = families_of(counts)
     elite = elites_of(families)
 
     def again_with(rng: np.random.Generator) -> Floats:
         others = counts_of_families(redrawn(families, elite, rng), counts)
-        return answer_for_niches(_chain(refitted(fitted, others)), question).value
+        return answer_for_niches(_chain(refitted(fitted, others)), question, announced=True).value
 
     numbers = told(range(resamples), on_done)
     again = np.array([again_with(keyed(seed, Purpose.RESAMPLING, number)) for number in numbers])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -114,6 +114,7 @@ def visit_metrics(
     lineages = question.lineages
     root = Root(chain, niche=niche, offspring=offspring)
     size = question.repeats_of_each(chain)
+    replace(question, method="monte-carlo").warn_if_long(chain)
     own = root.visited(question)
     steps = question.drawn_steps(own)
     samples = []

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -21,6 +22,8 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 _COLUMNS = 128
+# The derivative costs so many times what l-evolvability itself does.
+_DERIVATIVE = 3
 # What a derivative may keep of all generations, for one block of niches.
 _MOST_BYTES = 2**30
 
@@ -88,6 +91,7 @@ def where_to_sample(
             "estimate it with empirical-bayes or dirichlet"
         )
     posterior = chain.posterior
+    _in_closed_form(question).warn_if_long(chain, samples=_DERIVATIVE + draws)
     mean = posterior.mean()
     slope = _derivative(chain, niche, question)
     spread = np.maximum((mean * slope**2).sum(axis=1) - (mean * slope).sum(axis=1) ** 2, 0.0)
@@ -149,7 +153,14 @@ def evolvability_derivative(
     backwards for a block of target niches at a time: all S² derivatives for about three times the work of
     l-evolvability itself, and as many products of dense matrices as there are generations.
     """
-    return _derivative(chain, niche, Question(l, lineages, convention))
+    question = Question(l, lineages, convention)
+    _in_closed_form(question).warn_if_long(chain, samples=_DERIVATIVE)
+    return _derivative(chain, niche, question)
+
+
+def _in_closed_form(question: Question) -> Question:
+    """The question as it is answered here, however many states there are."""
+    return replace(question, method="exact")
 
 
 def _derivative(chain: NicheChain, niche: Niche | None, question: Question) -> Floats:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -137,6 +138,7 @@ def _covered(chain: NicheChain, niches: Sequence[Niche], question: Question, lin
         raise NichechainError(f"{len(niches)} niches are given, but one to {len(_COLORS)} can be told apart")
     check_growth(chain.states)
     roots = [chain.state(niche) for niche in niches]
+    replace(question, method="exact").warn_if_long(chain)
     return np.array(
         [
             coverage_by_generation(

@@ -187,7 +187,7 @@ def level_drift(
     check_at_least(2, draws=draws)
     halves, _ = _parts(births, niches, 2)
     compared = _observed(halves, min_births)
-    early, late = (_levels(half, compared, question, number, like) for number, half in enumerate(halves))
+    early, late = (_levels(half, compared, question, number, like, 2) for number, half in enumerate(halves))
     difference = float(late.mean() - early.mean())
     spread = np.sqrt((early.var(ddof=1) + late.var(ddof=1)) * (1.0 + 1.0 / draws))
     width = float(stdtrit(2 * (draws - 1), 0.5 + _LEVEL / 2) * spread)
@@ -247,7 +247,8 @@ def level_course(
     rows = []
     for number, (own, so_far) in enumerate(zip(counts, grown, strict=True)):
         levels = [
-            _levels(some, compared, question, 2 * number + k, like) for k, some in enumerate((own, so_far))
+            _levels(some, compared, question, 2 * number + k, like, 2 * parts)
+            for k, some in enumerate((own, so_far))
         ]
         rows.append([_interval(x) for x in levels])
     (level, low, high), (grown_level, grown_low, grown_high) = np.moveaxis(np.array(rows), 0, 2)
@@ -317,8 +318,9 @@ def _levels(
     question: Question,
     number: int,
     like: DirichletPosterior | None,
+    levels: int,
 ) -> Floats:
-    """Mean l-evolvability over niches, by each draw of T, (draws,)."""
+    """Mean l-evolvability over niches, by each draw of T, (draws,): of so many levels that of this number."""
     known = None if like is None else like.prior
     prior = fit_prior(counts) if known is None else fit_prior(counts, known.strength, known.weights)
     posterior = DirichletPosterior(counts, prior.base, prior.strength, prior.design_effect, prior)
@@ -326,6 +328,8 @@ def _levels(
         # What is not known of the law is the same for all parts, so that none of it tells them apart.
         posterior = replace(posterior, law=like.law.taken_as_known())
     chain = with_posterior(counts, posterior, "early or late")
+    if number == 0:
+        replace(question, method="exact").warn_if_long(chain, samples=levels * question.draws)
     # Draws of their own: parts must not agree for having been drawn alike.
     seed = int(keyed(question.seed, Purpose.RESAMPLING, number).integers(2**31))
     question = replace(question, seed=seed)

@@ -21,6 +21,7 @@ from nichechain.chain.model import NicheChain
 from nichechain.chain.posterior import DirichletPosterior
 from nichechain.core.arrays import entries_at
 from nichechain.core.checks import check_at_least
+from nichechain.core.duration import warn_if_long
 from nichechain.core.errors import NichechainError
 from nichechain.core.randomness import Purpose, keyed
 from nichechain.core.text import rounded
@@ -34,6 +35,8 @@ Fit = Callable[[TransitionCounts], NicheChain]
 
 # The weight that no component of the base measure goes below.
 _FLOOR = 0.005
+# Births that all estimators are fitted to in a second, on grids with about a hundred births a niche.
+_BIRTHS_A_SECOND = 4e4
 
 
 @dataclass(frozen=True)
@@ -131,6 +134,8 @@ def compare_estimators(
     elites = int(elite.max(initial=-1)) + 1
     if elites < folds:
         raise NichechainError(f"folds is {folds}, but only {elites} elites have children")
+    births = int(families[:, 3].sum())
+    warn_if_long(folds * births / _BIRTHS_A_SECOND, f"of {births} births, fewer folds take less")
     fold = folds_of(elite, folds, keyed(seed, Purpose.FOLDS))
     parent, child, weight = families[:, 0], families[:, 2], families[:, 3]
     fits = dict(_fits(counts))

@@ -10,6 +10,7 @@ import numpy as np
 
 from nichechain.archive.archive import Archive
 from nichechain.core.checks import check_at_least, check_whole
+from nichechain.core.duration import warn_if_long
 from nichechain.core.errors import NichechainError
 from nichechain.evolvability.question import Question
 from nichechain.execution import Executor
@@ -28,6 +29,9 @@ from nichechain.validation.rollouts import OFFSPRING, OnDone, run_lineages, samp
 
 if TYPE_CHECKING:
     import pandas as pd
+
+# Births that are permuted in a second, on average over the tests.
+_PERMUTED_A_SECOND = 3e6
 
 
 @dataclass(frozen=True)
@@ -142,6 +146,10 @@ def validate(
         If fewer than 3 niches have births enough.
     """
     config = config or ValidationConfig()
+    warn_if_long(
+        config.permuted * archive.meta.births / _PERMUTED_A_SECOND,
+        f"of {archive.meta.births} births, fewer permutations take less",
+    )
     chain = archive.chain()
     roots = sample_roots(
         chain,

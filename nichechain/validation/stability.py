@@ -188,15 +188,19 @@ def rank_stability(
             f"{_FEWEST_NICHES}: lower min_births or build further"
         )
 
-    def scores(some: TransitionCounts, number: int) -> Floats:
-        chain = estimate(some, estimator)
-        # Draws of their own, so that rankings do not agree for having been drawn alike.
-        return answer_for_niches(chain, replace(question, seed=seed + number), roots=ranked).value[ranked]
-
     kept = [counts]
     for repeat in range(repeats):
         rank = _Thinner(counts, thin, keyed(seed, Purpose.THINNING, repeat))
         kept += [rank.part(0.0, 0.5), rank.part(0.5, 1.0), *(rank.part(0.0, part) for part in parts)]
+    whole = estimate(counts, estimator)
+    question.warn_if_long(whole, ranked.size, len(kept) * question.number_of_samples(whole))
+
+    def scores(some: TransitionCounts, number: int) -> Floats:
+        chain = whole if some is counts else estimate(some, estimator)
+        # Draws of their own, so that rankings do not agree for having been drawn alike.
+        own = replace(question, seed=seed + number)
+        return answer_for_niches(chain, own, roots=ranked, announced=True).value[ranked]
+
     full, *found = side_by_side(lambda number: scores(kept[number], number), range(len(kept)), on_done)
     each = parts.size + 2
     halves = np.array([_agreement(*found[each * repeat :][:2]) for repeat in range(repeats)])

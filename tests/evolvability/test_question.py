@@ -6,7 +6,20 @@ import numpy as np
 import pytest
 
 from nichechain import NicheChain, NichechainError, l_evolvability, niche_evolvability
-from nichechain.evolvability import Question, question
+from nichechain.core import duration
+from nichechain.evolvability import (
+    Question,
+    bootstrap_elites,
+    elite_evolvability,
+    evolvability_derivative,
+    genotype_evolvability,
+    prior_sensitivity,
+    question,
+    visit_metrics,
+    where_to_sample,
+)
+from nichechain.evolvability.by_generation import evolvability_table
+from nichechain.evolvability.reach import reach
 
 from .samples import T
 
@@ -55,13 +68,42 @@ def test_bad_roots(root, message):
         l_evolvability(NicheChain(T), **root)
 
 
-def test_what_could_take_over_ten_minutes_is_said_before(monkeypatch):
-    chain = NicheChain(np.full((3, 3), 1 / 3))
-    monkeypatch.setattr(question, "_LONG", 1e-9)
-    with pytest.warns(UserWarning, match=r"could take \d+ minutes: fewer roots"):
-        l_evolvability(chain, niche=0)
-    with pytest.warns(UserWarning, match="could take"):
-        niche_evolvability(chain, method="monte-carlo", repeats=2)
+FEW = {"l": 2, "lineages": 2, "draws": 2}
+
+
+@pytest.mark.parametrize(
+    "ask",
+    [
+        lambda a: l_evolvability(a.chain(), niche=0, **FEW),
+        lambda a: niche_evolvability(a.chain(), method="monte-carlo", repeats=2, **FEW),
+        lambda a: reach(a.chain(), niche=0, **FEW),
+        lambda a: visit_metrics(a.chain(), niche=0, repeats=2, **FEW),
+        lambda a: elite_evolvability(a, **FEW),
+        lambda a: genotype_evolvability(a, a.elite(int(a.elites.niche[0])), **FEW),
+        lambda a: where_to_sample(a.chain(), niche=0, **FEW),
+        lambda a: evolvability_derivative(a.chain(), niche=0, l=2),
+        lambda a: evolvability_table(a.chain(), 2, [2], draws=2),
+        lambda a: prior_sensitivity(a.counts, **FEW),
+        lambda a: bootstrap_elites(a.counts, resamples=2, **FEW),
+    ],
+    ids=lambda ask: ask.__code__.co_names[0],
+)
+def test_what_could_take_over_ten_minutes_is_said_before(ask, arm_archive, monkeypatch):
+    monkeypatch.setattr(duration, "_LONG", 1e-12)
+    with pytest.warns(UserWarning, match="could take") as told:
+        ask(arm_archive)
+    # Once, also where many questions make one answer.
+    (said,) = (str(warning.message) for warning in told)
+    assert said == "this could take 0 minutes: fewer roots, lineages, generations or draws take less"
+
+
+def test_minutes_of_many_questions_are_those_of_all(arm_archive, monkeypatch):
+    """Two resamples of 3 draws, and the value of 50: a question of 56 draws."""
+    told = []
+    monkeypatch.setattr(question, "warn_if_long", lambda seconds, *_, **__: told.append(seconds))
+    bootstrap_elites(arm_archive.counts, resamples=2, l=2, lineages=2, draws=3)
+    niche_evolvability(arm_archive.chain(), l=2, lineages=2, draws=56)
+    assert told[0] == told[1] > 0
 
 
 def test_rows_of_elites_do_not_depend_on_who_else_is_asked_for():
