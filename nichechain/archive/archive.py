@@ -18,6 +18,7 @@ from nichechain.births.orphans import orphan_note
 from nichechain.chain import NicheChain, TransitionCounts, estimate
 from nichechain.chain.filters import COUNTED, counts_of, within_steps
 from nichechain.core.errors import ArchiveError, NichechainError
+from nichechain.core.files import as_path
 from nichechain.core.notebook import facts_table
 from nichechain.core.suggestions import did_you_mean
 from nichechain.domains.base import Domain
@@ -322,7 +323,7 @@ def load(path: str | Path, *, domain: Domain | None = None) -> Archive:
     ArchiveError
         If there is no archive there, or it is damaged.
     """
-    folder = Path(path)
+    folder = as_path("path", path)
     if not folder.exists():
         folder = _shipped(folder) or folder
     return Archive(folder, domain)

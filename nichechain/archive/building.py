@@ -17,7 +17,7 @@ from nichechain.archive.filling import BuildProgress, Filling, count
 from nichechain.archive.notebook import bar_in_notebook
 from nichechain.births.table import NONE
 from nichechain.core.errors import ArchiveError
-from nichechain.core.files import writing
+from nichechain.core.files import as_path, writing
 from nichechain.domains.base import Domain
 from nichechain.execution import Executor
 from nichechain.search import savings
@@ -76,7 +76,7 @@ def build(
         births fail than may; what there is by then is committed.
     """
     failures = Failures(max_failed)
-    folder = Path(folder)
+    folder = as_path("folder", folder)
     given = domain
     domain = domain or make_domain(config)
     domain, mutate = make_mutation(config, domain)

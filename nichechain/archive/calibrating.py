@@ -26,7 +26,7 @@ from nichechain.archive.archive import Archive
 from nichechain.archive.filling import BuildProgress, Filling
 from nichechain.core.checks import check_at_least
 from nichechain.core.errors import ArchiveError, NichechainError
-from nichechain.core.files import writing
+from nichechain.core.files import as_path, writing
 from nichechain.execution import Executor, Threads
 from nichechain.search import savings
 from nichechain.search.config import BROOD, MOST_FAILED
@@ -82,7 +82,7 @@ def calibrate(
     _check_asked(rollouts, resume)
     check_at_least(1, brood=brood)
     failures = Failures(max_failed)
-    opened = archive if isinstance(archive, Archive) else Archive(Path(archive))
+    opened = archive if isinstance(archive, Archive) else Archive(as_path("archive", archive))
     folder = opened.folder
     _check_can(opened.meta, folder)
     domain, mutate = opened.domain, opened.mutate

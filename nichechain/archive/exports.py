@@ -16,7 +16,7 @@ import numpy as np
 
 from nichechain.births.joins import across_runs, parent_rows
 from nichechain.births.table import NONE, check_columns
-from nichechain.core.files import replace_file
+from nichechain.core.files import as_path, replace_file
 from nichechain.niches import Niches
 
 if TYPE_CHECKING:
@@ -140,7 +140,7 @@ def write_stn(births: pd.DataFrame, niches: Niches, path: str | Path) -> None:
             strict=True,
         )
     )
-    separator = "," if Path(path).suffix.lower() == ".csv" else " "
+    separator = "," if as_path("path", path).suffix.lower() == ".csv" else " "
     names = ["Run", "Fitness1", "Solution1", "Fitness2", "Solution2"]
     replace_file(path, _csv(names, rows, separator))
 

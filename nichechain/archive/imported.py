@@ -14,7 +14,7 @@ from nichechain.archive.log_columns import Columns, LogReader
 from nichechain.archive.logs import read_log
 from nichechain.core.checks import shown
 from nichechain.core.errors import ArchiveError, NichechainError
-from nichechain.core.files import writing
+from nichechain.core.files import as_path, writing
 from nichechain.niches import Niches
 from nichechain.search.config import BuildConfig
 from nichechain.search.elites import Elites, SearchState
@@ -142,7 +142,7 @@ def write_archive(
     ArchiveError
         If the folder holds an archive.
     """
-    folder = Path(folder)
+    folder = as_path("folder", folder)
     dimensions = len(niches.bounds)
     facts = read.DomainFacts(_axis_names(axes, dimensions), axes.unit, objective_name, None)
     config = BuildConfig(

@@ -12,6 +12,7 @@ import pyarrow as pa
 
 from nichechain.core.checks import shown
 from nichechain.core.errors import NichechainError
+from nichechain.core.files import as_path
 from nichechain.core.parquet import read_parquet
 
 if TYPE_CHECKING:
@@ -44,7 +45,7 @@ def read_log(log: str | Path | pd.DataFrame | pa.Table) -> tuple[pa.Table, dict[
         return table, {"file": "a DataFrame", "sha256": _digest_of(table)}
     if not isinstance(log, (str, Path)):
         raise NichechainError(f"log is a {type(log).__name__}, but must be a file, a folder or a DataFrame")
-    path = Path(log)
+    path = as_path("log", log)
     if path.is_dir():
         parts = sorted(path.glob("*.parquet"))
         if not parts:

@@ -15,7 +15,7 @@ from nichechain.archive import read, write
 from nichechain.births.table import NONE
 from nichechain.core.checks import as_tuple, shown
 from nichechain.core.errors import ArchiveError, NichechainError
-from nichechain.core.files import writing
+from nichechain.core.files import as_path, writing
 from nichechain.niches import Niches
 from nichechain.search.config import BuildConfig
 from nichechain.search.elites import Elites, SearchState
@@ -73,7 +73,7 @@ def merge(folders: Sequence[str | Path], out: str | Path) -> None:
     for folder in as_tuple("folders", folders):
         if not isinstance(folder, (str, Path)):
             raise NichechainError(f"folders have {shown(folder)}, but must be folders of archives")
-    paths, out = [Path(folder) for folder in folders], Path(out)
+    paths, out = [as_path("folders", folder) for folder in folders], as_path("out", out)
     if len(paths) < 2:
         raise NichechainError(f"{len(paths)} archive cannot be merged: give at least two")
     metas = [read.read_meta(path) for path in paths]

@@ -217,7 +217,7 @@ def _write(
     """Table, summary and maps; the names of the files."""
     import io
 
-    from nichechain.core.files import write_atomically
+    from nichechain.core.files import replace_file
 
     if out.suffix.lower() == ".csv":
         table = frame.to_csv(index=False, float_format="%.9g").encode()
@@ -234,7 +234,7 @@ def _write(
         plot_landscape(archive, found, figure, MAPS if command.map is None else command.map.split(","))
         files[out.with_suffix(".png")] = output.figure_bytes(figure, ".png", dpi=110)
     for path, content in files.items():
-        write_atomically(path, content)
+        replace_file(path, content)
     return [str(path) for path in files]
 
 

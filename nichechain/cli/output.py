@@ -24,9 +24,9 @@ PICTURES = (".png", ".svg", ".pdf")
 
 def console() -> Console:
     """Standard output, with colours only where it is a terminal that wants them."""
-    from rich.console import Console
+    from nichechain.cli.marks import MarkedConsole
 
-    return Console(highlight=False, soft_wrap=not sys.stdout.isatty())
+    return MarkedConsole(highlight=False, soft_wrap=not sys.stdout.isatty())
 
 
 def table(*columns: str, title: str | None = None) -> Table:
@@ -101,9 +101,9 @@ def save_figure(figure: Figure, out: Path, dpi: int = 150) -> None:
     dpi : int
         Resolution, of a ``.png``.
     """
-    from nichechain.core.files import write_atomically
+    from nichechain.core.files import replace_file
 
-    write_atomically(out, figure_bytes(figure, out.suffix, dpi))
+    replace_file(out, figure_bytes(figure, out.suffix, dpi))
 
 
 def figure_bytes(figure: Figure, ending: str, dpi: int) -> bytes:

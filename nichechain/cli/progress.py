@@ -231,9 +231,9 @@ def _say(text: str) -> None:
 
 
 def _console() -> Console:
-    from rich.console import Console
+    from nichechain.cli.marks import MarkedConsole
 
-    return Console(stderr=True, quiet=_QUIET.get())
+    return MarkedConsole(stderr=True, quiet=_QUIET.get())
 
 
 class _Lines:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from nichechain.cli import output, parsing, progress, workers
 from nichechain.core.errors import NichechainError
+from nichechain.core.files import replace_file
 from nichechain.core.text import some
 
 if TYPE_CHECKING:
@@ -69,8 +70,8 @@ def run(arguments: Sequence[str]) -> int:
         )
     # Made only now, so that bad input leaves nothing behind.
     out.mkdir(parents=True, exist_ok=True)
-    (out / "validation.json").write_text(json.dumps(result.to_json(), indent=2) + "\n", encoding="utf-8")
-    result.direct.lineages.to_frame().to_csv(out / "lineages.csv", index=False)
+    replace_file(out / "validation.json", (json.dumps(result.to_json(), indent=2) + "\n").encode())
+    replace_file(out / "lineages.csv", result.direct.lineages.to_frame().to_csv(index=False).encode())
     _draw(result, out / "calibration.png")
     _show(result, config)
     output.console().print(f"wrote validation.json, calibration.png and lineages.csv to {out}")

@@ -100,6 +100,19 @@ def check_at_least(least: int, **values: object) -> None:
             raise NichechainError(f"{name} is {value}, but must {allowed}")
 
 
+def check_fits(**values: int) -> None:
+    """Refuse whole numbers that 64 bits do not hold, which NumPy cannot calculate with.
+
+    Raises
+    ------
+    NichechainError
+        If a value is one.
+    """
+    for name, value in values.items():
+        if not -(2**63) <= value < 2**63:
+            raise NichechainError(f"{name} is {shown(value)}, but must be between -2**63 and 2**63 - 1")
+
+
 def check_sample(n: int, length: int) -> int:
     """How many genotypes of some length are asked for, as a plain number.
 
@@ -252,7 +265,7 @@ def as_floats(name: str, values: ArrayLike) -> NDArray[np.float64]:
             # NumPy would drop the imaginary parts with a warning.
             raise TypeError
         return given.astype(np.float64, copy=False)
-    except (TypeError, ValueError):
+    except (OverflowError, TypeError, ValueError):
         raise NichechainError(f"{name} has values that are no numbers, or rows of unequal length") from None
 
 

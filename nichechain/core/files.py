@@ -9,10 +9,41 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+from nichechain.core.checks import shown
 from nichechain.core.errors import ArchiveError, NichechainError
 
 # The file by which a folder is known to hold an archive, or a study.
 ARCHIVE_MARK, STUDY_MARK = "meta.json", "study.json"
+
+# Bytes of a name, by every file system that Linux has.
+_LONGEST_NAME = 255
+
+
+def as_path(name: str, value: str | Path) -> Path:
+    """A path that files can have, whether one does or not.
+
+    Parameters
+    ----------
+    name : str
+        What the caller knows it by.
+    value : str or Path
+
+    Raises
+    ------
+    NichechainError
+        If it is no path, or no file can have such a name.
+    """
+    try:
+        path = Path(value)
+        longest = max(map(len, map(os.fsencode, path.parts)), default=0)
+    except (TypeError, ValueError):
+        raise NichechainError(f"{name} is {shown(value)}, but must be a path") from None
+    if longest > _LONGEST_NAME or "\0" in str(path):
+        raise NichechainError(
+            f"{name} is {shown(str(path))}, "
+            f"but names of files must have at most {_LONGEST_NAME} bytes, none of them 0"
+        )
+    return path
 
 
 def keep_apart(folder: Path, mark: str) -> None:
@@ -72,7 +103,7 @@ def replace_file(path: str | Path, content: bytes) -> None:
         If it cannot be written; what it held is then still there.
     """
     try:
-        write_atomically(Path(path), content)
+        write_atomically(as_path("path", path), content)
     except OSError as error:
         raise NichechainError(f"{path} cannot be written: {error.strerror}") from error
 

@@ -13,7 +13,7 @@ from scipy import sparse
 
 from nichechain.chain.lineages import scattered_rows
 from nichechain.chain.model import NicheChain, Transition
-from nichechain.core.checks import as_floats, check_at_least, check_choice, check_seed
+from nichechain.core.checks import as_floats, check_at_least, check_choice, check_fits, check_seed
 from nichechain.core.duration import warn_if_long
 from nichechain.core.errors import NichechainError
 from nichechain.core.randomness import Purpose, keyed
@@ -132,6 +132,7 @@ class Question:
         check_choice("convention", self.convention, get_args(Convention))
         check_choice("method", self.method, get_args(Method))
         check_seed(self.seed)
+        check_fits(l=self.l, lineages=self.lineages, repeats=self.repeats, draws=self.draws)
         for name in ("l", "lineages", "repeats", "draws", "seed"):
             # Short numbers of NumPy would overflow in what is computed with them.
             object.__setattr__(self, name, int(getattr(self, name)))

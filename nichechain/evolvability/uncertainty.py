@@ -123,7 +123,7 @@ def prior_sensitivity(
         "all displacement": replace(given, base=_only(base, np.array([0.0, 1.0 - rest, rest]))),
     }
     chain = _chain(fitted)
-    question.warn_if_long(chain, chain.n_niches, len(priors) * draws)
+    question.warn_if_long(chain, chain.n_niches, len(priors) * question.draws)
     fits = told((_chain(posterior) for posterior in priors.values()), on_done)
     values = np.array([answer_for_niches(fit, question, announced=True).value for fit in fits])
     return NicheBand("prior sensitivity", values[0], values.min(axis=0), values.max(axis=0), tuple(priors))
@@ -190,7 +190,7 @@ def bootstrap_elites(
     assert fitted is not None
 
     chain = _chain(fitted)
-    question.warn_if_long(chain, chain.n_niches, DRAWS + resamples * draws)
+    question.warn_if_long(chain, chain.n_niches, DRAWS + int(resamples) * question.draws)
     value = answer_for_niches(chain, replace(question, draws=DRAWS), announced=True).value
     families = families_of(counts)
     elite = elites_of(families)

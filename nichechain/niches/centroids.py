@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from nichechain.core.errors import NichechainError
+from nichechain.core.files import as_path
 from nichechain.core.parquet import read_parquet
 from nichechain.niches.base import Floats
 
@@ -26,7 +27,7 @@ def read_centroids(path: str | Path) -> Floats:
     NichechainError
         If it cannot be read, or holds something else.
     """
-    path = Path(path)
+    path = as_path("path", path)
     kind = path.suffix.lower()
     if kind not in (".npy", ".csv", ".txt", ".parquet"):
         raise NichechainError(

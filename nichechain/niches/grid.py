@@ -51,7 +51,7 @@ class GridNiches(Niches):
         object.__setattr__(self, "bounds", as_bounds(self.bounds))
         if not self.shape or min(self.shape) < 1:
             raise NichechainError(f"grid shape is {self.shape}, but every axis needs at least 1 cell")
-        if len(self) > MOST_NICHES:
+        if math.prod(self.shape) > MOST_NICHES:
             raise NichechainError(f"grid shape is {self.shape}, but a grid has at most {MOST_NICHES} cells")
         if len(self.shape) != len(self.bounds):
             raise NichechainError(

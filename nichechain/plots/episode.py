@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from nichechain.core.checks import check_whole
 from nichechain.core.errors import NichechainError
-from nichechain.core.files import write_atomically
+from nichechain.core.files import as_path, replace_file
 from nichechain.domains.watching import Film, Motion, watch
 from nichechain.niches import Niche
 from nichechain.plots.cells import borders, frame
@@ -58,7 +58,7 @@ def watch_elite(archive: Archive, niche: Niche, out: Path | str, *, drawn: bool 
         If the niche is empty, the domain cannot be watched or shows nothing here, the ending is
         unknown, or there is no ffmpeg.
     """
-    out = Path(out)
+    out = as_path("out", out)
     if out.suffix not in ENDINGS:
         raise NichechainError(f"out is {out}, but must end in {', '.join(ENDINGS)}")
     if out.suffix == ".mp4" and shutil.which("ffmpeg") is None:
@@ -75,17 +75,17 @@ def watch_elite(archive: Archive, niche: Niche, out: Path | str, *, drawn: bool 
 def write_film(film: Film, out: Path) -> None:
     """Write a film as .gif or .mp4, or six of its moments as .png."""
     if out.suffix == ".png":
-        write_atomically(out, _png(_sheet(film.frames)))
+        replace_file(out, _png(_sheet(film.frames)))
     elif out.suffix == ".mp4":
         _write_mp4(film, out)
     else:
-        write_atomically(out, _gif(film))
+        replace_file(out, _gif(film))
 
 
 def write_motion(archive: Archive, niche: int, motion: Motion, out: Path) -> None:
     """Write a drawing over the map: the whole as .png, moment by moment as .gif or .mp4."""
     if out.suffix == ".png":
-        write_atomically(out, _png(next(_drawings(archive, niche, motion, [len(motion) - 1]))))
+        replace_file(out, _png(next(_drawings(archive, niche, motion, [len(motion) - 1]))))
         return
     frames = np.stack(list(_drawings(archive, niche, motion, list(range(len(motion))))))
     write_film(Film(frames, motion.rate), out)

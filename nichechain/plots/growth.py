@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nichechain.chain.model import NicheChain
-from nichechain.core.checks import check_at_least
+from nichechain.core.checks import as_tuple, check_at_least, check_fits
 from nichechain.core.errors import NichechainError
 from nichechain.core.intervals import drawn_interval
 from nichechain.core.text import some
@@ -68,7 +68,9 @@ def plot_generations(
         If a niche does not exist, a number is out of range, or there are too many niches.
     """
     ax = axes_of(ax)
+    niches = as_tuple("niches", niches)
     check_at_least(1, longest=longest)
+    check_fits(longest=longest)
     question = Question(longest, lineages, draws=draws, seed=seed)
     covered = _covered(chain, niches, question, np.array([lineages, ENDLESS]))
     _lines(ax, chain, niches, np.arange(1, longest + 1), covered[..., 0], covered[..., 1])
@@ -108,8 +110,10 @@ def plot_lineages(
         As in :func:`plot_generations`.
     """
     ax = axes_of(ax)
+    niches = as_tuple("niches", niches)
     question = Question(l, draws=draws, seed=seed)
     check_at_least(2, most=most)
+    check_fits(most=most)
     sizes = np.unique(np.round(np.geomspace(1, most, 17)).astype(np.int64))
     covered = _covered(chain, niches, question, np.append(sizes, ENDLESS))[:, :, -1]
     _lines(ax, chain, niches, sizes, covered[..., :-1], covered[..., -1:])

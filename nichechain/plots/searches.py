@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nichechain.core.errors import NichechainError
+from nichechain.core.checks import as_tuple, check_choice
 from nichechain.core.intervals import mean_interval
-from nichechain.plots.style import EDGE, LONG_JUMP, START
+from nichechain.plots.style import EDGE, LONG_JUMP, START, check_records, plain
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -41,20 +41,15 @@ def plot_filled(records: pd.DataFrame, ax: Axes, *, selections: Sequence[str] | 
     NichechainError
         If a column is missing or there is no search of a selection.
     """
-    for name in ("selection", "run", "births", "filled"):
-        if name not in records:
-            raise NichechainError(f"records have no column {name}, but need selection, run, births, filled")
-    names = list(dict.fromkeys(records["selection"])) if selections is None else list(selections)
+    check_records(records, "selection", "run", "births", "filled")
+    names = dict.fromkeys(records["selection"]) if selections is None else as_tuple("selections", selections)
     for number, name in enumerate(names):
+        check_choice("selections", name, records["selection"].unique())
         rows = records[records["selection"] == name]
-        if not len(rows):
-            raise NichechainError(
-                f"selections has {name!r}, but must be among {', '.join(records['selection'].unique())}"
-            )
         table = rows.pivot_table(index="births", columns="run", values="filled")
         mean, low, high = mean_interval(table.to_numpy().T)
         color = _COLORS[number % len(_COLORS)]
-        ax.plot(table.index, mean, color=color, linestyle=_STYLES[number % len(_STYLES)], label=name)
+        ax.plot(table.index, mean, color=color, linestyle=_STYLES[number % len(_STYLES)], label=plain(name))
         if np.isfinite(low).all():
             ax.fill_between(table.index, low, high, color=color, alpha=0.18, linewidth=0)
     ax.set(xlabel="births", ylabel="niches filled", xlim=(0, records["births"].max()), ylim=(0, None))

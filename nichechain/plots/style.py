@@ -9,11 +9,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from nichechain.core.checks import shown
 from nichechain.core.errors import NichechainError
 from nichechain.core.text import rounded
 from nichechain.niches import GridNiches
 
 if TYPE_CHECKING:
+    import pandas as pd
     from matplotlib.axes import Axes
     from matplotlib.cm import ScalarMappable
 
@@ -122,6 +124,23 @@ def _name_niches(ax: Axes, archive: Archive) -> None:
         side.spines[:].set_visible(False)
         axis.set_label_text(f"niche {name}", fontsize="x-small", color=_NAMES)
         axis.labelpad = 1
+
+
+def check_records(records: pd.DataFrame, *columns: str) -> None:
+    """Refuse what is no table of a study.
+
+    Raises
+    ------
+    NichechainError
+        If it is no DataFrame, or a column is missing.
+    """
+    import pandas as pd
+
+    if not isinstance(records, pd.DataFrame):
+        raise NichechainError(f"records is {shown(records)}, but must be a DataFrame")
+    missing = [name for name in columns if name not in records]
+    if missing:
+        raise NichechainError(f"records have no column {missing[0]}, but need {', '.join(columns)}")
 
 
 def plain(text: str) -> str:

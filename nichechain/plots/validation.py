@@ -47,6 +47,8 @@ def plot_calibration(check: DirectCheck, ax: Axes | None = None, *, generation: 
     check_whole(generation=generation)
     if not 1 <= generation <= last:
         raise NichechainError(f"generation is {generation}, but must be between 1 and {last}")
+    # True is a whole number, but no label.
+    generation = int(generation)
     k = generation - 1
     summary = check.summary().set_index(["start", "generation"])
     reached = check.reached[:, k]

@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from nichechain.core.checks import check_choice
+from nichechain.core.checks import as_tuple, check_choice, check_text, check_whole
 from nichechain.core.errors import NichechainError
 from nichechain.core.intervals import mean_interval
-from nichechain.plots.style import FAINT, INK, axes_of, plain
+from nichechain.core.text import some
+from nichechain.plots.style import FAINT, INK, axes_of, check_records, plain
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -114,6 +115,7 @@ def plot_walks(
     """
     ax = axes_of(ax)
     labels = _labels(records, measure, conditions)
+    check_text(unit=unit)
     for place, (label, style) in enumerate(line_styles(labels, ordered=ordered).items()):
         table = _pivot(records, label, measure)
         mean, low, high = mean_interval(table.to_numpy(np.float64))
@@ -140,7 +142,7 @@ def plot_walks(
             markeredgecolor="white",
             markeredgewidth=0.4,
             linewidth=1.4,
-            label=f"{label} ({len(table)} runs)" if len(table) > 1 else f"{label} (1 run)",
+            label=f"{plain(label)} ({some(len(table), 'run')})",
         )
     ax.set(xlabel="step", ylabel=_axis(measure, unit), xlim=(0, max(1, int(records["step"].max()))))
     # No measure is ever negative, though an interval may reach below.
@@ -178,8 +180,8 @@ def plot_runs(
     """
     ax = axes_of(ax)
     labels = _labels(records, measure, conditions)
-    if step not in set(records["step"]):
-        raise NichechainError(f"step is {step}, but the walks have steps 0 to {records['step'].max()}")
+    check_text(unit=unit)
+    _check_step(records, step)
     for place, (label, style) in enumerate(line_styles(labels, ordered=ordered).items()):
         values = _pivot(records, label, measure)[step].dropna().to_numpy(np.float64)
         box = ax.boxplot(
@@ -205,6 +207,7 @@ def plot_runs(
             alpha=0.75,
             markeredgewidth=0,
         )
+    labels = [plain(label) for label in labels]
     # The name of what varies once, not at every tick; words under each other need less room.
     varied = {label.partition(" ")[0] for label in labels if " " in label}
     if len(varied) == 1 and all(" " in label for label in labels):
@@ -253,8 +256,9 @@ def draw_study(
     from matplotlib.figure import Figure
 
     check_choice("main", main, DRAWN)
-    if step not in set(records["step"]):
-        raise NichechainError(f"step is {step}, but the walks have steps 0 to {records['step'].max()}")
+    check_text(title=title)
+    _labels(records, main, conditions)
+    _check_step(records, step)
     if not records["step"].any():
         return _draw_starts(records, conditions=conditions, ordered=ordered, unit=unit, title=title)
     figure = Figure(figsize=(11.0, 8.6), layout="constrained")
@@ -274,7 +278,7 @@ def draw_study(
         handlelength=3.2,
         fontsize="small",
     )
-    figure.suptitle(title)
+    figure.suptitle(plain(title))
     return figure
 
 
@@ -287,7 +291,7 @@ def _draw_starts(
     figure = Figure(figsize=(15.0, 4.6), layout="constrained")
     for ax, measure in zip(figure.subplots(1, 3), _OF_STATES, strict=True):
         plot_runs(records, ax, step=0, measure=measure, conditions=conditions, ordered=ordered, unit=unit)
-    figure.suptitle(f"{title}: every run at step 0, median and quartiles")
+    figure.suptitle(f"{plain(title)}: every run at step 0, median and quartiles")
     return figure
 
 
@@ -298,13 +302,20 @@ def _columns(labels: Sequence[str]) -> int:
 
 def _labels(records: pd.DataFrame, measure: str, conditions: Sequence[str] | None) -> list[str]:
     check_choice("measure", measure, DRAWN)
+    check_records(records, "condition", "run", "step", measure)
     there = list(dict.fromkeys(records["condition"]))
     if not there:
         raise NichechainError("there are no finished walks to draw")
-    labels = there if conditions is None else list(conditions)
+    labels = there if conditions is None else list(dict.fromkeys(as_tuple("conditions", conditions)))
     for label in labels:
         check_choice("condition", label, there)
     return labels
+
+
+def _check_step(records: pd.DataFrame, step: int) -> None:
+    check_whole(step=step)
+    if step not in set(records["step"]):
+        raise NichechainError(f"step is {step}, but the walks have steps 0 to {records['step'].max()}")
 
 
 def _pivot(records: pd.DataFrame, label: str, measure: str) -> pd.DataFrame:

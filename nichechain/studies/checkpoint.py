@@ -16,10 +16,9 @@ from numpy.typing import NDArray
 from nichechain.core.errors import ArchiveError
 from nichechain.core.files import write_atomically
 from nichechain.core.parquet import parquet_bytes, read_parquet
-from nichechain.studies.folder import Block
+from nichechain.studies.folder import CHECKPOINT, Block
 from nichechain.walks import WalkState
 
-_FILE = "running.npz"
 _PREFIX = "state_"
 
 
@@ -53,7 +52,7 @@ def write_checkpoint(folder: Path, block: Block, at: Walked) -> None:
         arrays[name] = np.frombuffer(content, np.uint8)
     file = io.BytesIO()
     np.savez(file, **arrays)
-    write_atomically(folder / _FILE, file.getvalue())
+    write_atomically(folder / CHECKPOINT, file.getvalue())
 
 
 def under_way(folder: Path) -> str | None:
@@ -95,12 +94,12 @@ def read_checkpoint(folder: Path, block: Block) -> Walked | None:
 
 def remove_checkpoint(folder: Path) -> None:
     """Nothing is under way any more."""
-    (folder / _FILE).unlink(missing_ok=True)
+    (folder / CHECKPOINT).unlink(missing_ok=True)
 
 
 def _load(folder: Path, names: Sequence[str] | None = None) -> dict[str, NDArray[Any]] | None:
     try:
-        with np.load(folder / _FILE, allow_pickle=False) as stored:
+        with np.load(folder / CHECKPOINT, allow_pickle=False) as stored:
             return {name: stored[name] for name in names or stored.files}
     except FileNotFoundError:
         return None
@@ -109,5 +108,5 @@ def _load(folder: Path, names: Sequence[str] | None = None) -> dict[str, NDArray
 
 
 def _damaged(folder: Path, error: Exception) -> ArchiveError:
-    path = folder / _FILE
+    path = folder / CHECKPOINT
     return ArchiveError(f"{path} is damaged: {error}; without that file, the walks under way begin anew")

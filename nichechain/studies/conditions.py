@@ -8,7 +8,7 @@ from dataclasses import dataclass, fields
 from typing import get_args
 
 from nichechain import variation
-from nichechain.core.checks import check_at_least, check_choice, shown
+from nichechain.core.checks import check_at_least, check_choice, check_text, shown
 from nichechain.core.errors import NichechainError
 from nichechain.core.randomness import Purpose, keyed
 from nichechain.studies.initialisation import check_scheme
@@ -25,6 +25,9 @@ from nichechain.walks import (
     diversity,
 )
 from nichechain.walks.diversity import ArchiveRule, Metric
+
+# It names files, and stands in tables.
+_LONGEST_LABEL = 100
 
 
 @dataclass(frozen=True)
@@ -61,8 +64,12 @@ class Condition(WalkSettings):
     def __post_init__(self) -> None:
         check_choice("metric", self.metric, get_args(MetricName))
         check_choice("mode", self.mode, get_args(Mode))
-        if not self.slug:
-            raise NichechainError(f"label is {shown(self.label)}, but must have a letter or a digit")
+        check_text(label=self.label)
+        if not (self.slug and self.label.isprintable() and len(self.label) <= _LONGEST_LABEL):
+            raise NichechainError(
+                f"label is {shown(self.label)}, but must have a letter or a digit, and at most "
+                f"{_LONGEST_LABEL} characters, all of them printable"
+            )
         check_at_least(1, litter=self.litter)
         check_scheme(self.initialisation)
         self.walk_config(0)
@@ -126,11 +133,11 @@ def selection_of(level: str) -> Selection:
         "better": BetterThanParent(),
         "random": Uniform(),
     }
-    if level in named:
+    if isinstance(level, str) and level in named:
         return named[level]
     try:
         return TopFraction(float(level))
-    except (TypeError, ValueError):
+    except (OverflowError, TypeError, ValueError):
         raise NichechainError(
             f"level is {shown(level)}, "
             "but must be selective, better, random, or a fraction above 0 and at most 1"
@@ -145,16 +152,19 @@ def pressure_of(level: str) -> float:
     NichechainError
         If the level is ``better``, which lets pass a share that changes, or is none.
     """
-    if level == "selective":
-        return 0.0
-    if level == "random":
-        return 1.0
     rule = selection_of(level)
-    if isinstance(rule, TopFraction):
-        return rule.fraction
+    match rule:
+        case Selective():
+            return 0.0
+        case Uniform():
+            return 1.0
+        case TopFraction():
+            return rule.fraction
     raise NichechainError(f"level is {shown(level)}, which lets no fixed share of the offspring pass")
 
 
 def condition_seed(seed: int, label: str) -> int:
     """Seed of a condition's runs: it depends on its label, not on the conditions beside it."""
-    return int(keyed(seed, Purpose.CONDITION, zlib.crc32(label.encode())).integers(2**63))
+    check_text(label=label)
+    number = zlib.crc32(label.encode("utf-8", "surrogatepass"))
+    return int(keyed(seed, Purpose.CONDITION, number).integers(2**63))

@@ -9,7 +9,7 @@ from html import escape
 from pathlib import Path
 
 from nichechain.core.errors import NichechainError
-from nichechain.core.files import write_atomically
+from nichechain.core.files import as_path, write_atomically
 
 _CSS = """
 :root { color-scheme: light; }
@@ -175,7 +175,7 @@ def write_files(folder: str | Path, files: Mapping[str, bytes]) -> None:
     NichechainError
         If they cannot be written.
     """
-    folder = Path(folder)
+    folder = as_path("folder", folder)
     try:
         folder.mkdir(parents=True, exist_ok=True)
         for name, data in files.items():

@@ -16,13 +16,14 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from nichechain.core.errors import ArchiveError
-from nichechain.core.files import write_atomically
+from nichechain.core.files import STUDY_MARK, as_path, write_atomically
 from nichechain.core.parquet import parquet_bytes
 from nichechain.studies.conditions import Condition
 from nichechain.studies.stored import read_rows, read_stored, write_stored
 from nichechain.studies.study import Study
 
 _BIRTHS, _RECORDS = "births", "records"
+CHECKPOINT = "running.npz"
 
 
 @dataclass(frozen=True)
@@ -96,12 +97,12 @@ def _read(folder: str | Path) -> tuple[Study, str]:
     def read(values: dict[str, Any]) -> tuple[Study, str]:
         return Study.from_json(values["study"]), str(values["unit"])
 
-    return read_stored(Path(folder), read, "walks")
+    return read_stored(as_path("folder", folder), read, "walks")
 
 
 def finished_blocks(folder: str | Path, study: Study) -> list[Block]:
     """Blocks that are walked to their end, condition by condition, by the numbers of their runs."""
-    names = [path.stem for path in (Path(folder) / _RECORDS).glob("*.parquet")]
+    names = [path.stem for path in (as_path("folder", folder) / _RECORDS).glob("*.parquet")]
     return [
         block
         for condition in study.conditions
@@ -115,6 +116,14 @@ def write_block(folder: Path, block: Block, *, births: pa.Table, records: pa.Tab
     # Records last: a block that has them is finished.
     for name, table in ((_BIRTHS, births), (_RECORDS, records)):
         write_atomically(folder / name / f"{block.name}.parquet", parquet_bytes(table))
+
+
+def remove_leftovers(folder: Path) -> None:
+    """Remove what a crash left half-written, and nothing of anybody else's."""
+    rows = (f"{name}/*.parquet.tmp" for name in (_BIRTHS, _RECORDS))
+    for pattern in (f"{STUDY_MARK}.tmp", f"{CHECKPOINT}.tmp", *rows):
+        for path in folder.glob(pattern):
+            path.unlink(missing_ok=True)
 
 
 def read_records(folder: str | Path, study: Study | None = None) -> pa.Table:
@@ -137,7 +146,7 @@ def read_records(folder: str | Path, study: Study | None = None) -> pa.Table:
     ArchiveError
         If the folder holds no study or a file is damaged.
     """
-    return _read_blocks(Path(folder), _RECORDS, study)
+    return _read_blocks(as_path("folder", folder), _RECORDS, study)
 
 
 def read_births(folder: str | Path, study: Study | None = None) -> pa.Table:
@@ -148,7 +157,7 @@ def read_births(folder: str | Path, study: Study | None = None) -> pa.Table:
     ArchiveError
         If the folder holds no study or a file is damaged.
     """
-    return _read_blocks(Path(folder), _BIRTHS, study)
+    return _read_blocks(as_path("folder", folder), _BIRTHS, study)
 
 
 def _read_blocks(folder: Path, name: str, study: Study | None) -> pa.Table:

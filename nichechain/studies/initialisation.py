@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from nichechain.core.checks import check_at_least, rng_of, shown
+from nichechain.core.checks import check_sample, rng_of, shown
 from nichechain.core.errors import NichechainError
 from nichechain.domains.base import Domain
 from nichechain.domains.policies.controllers import MLP
@@ -50,7 +50,7 @@ def initialise(domain: Domain, scheme: str, n: int, *, seed: int | np.random.Gen
         If there is no such scheme, or the domain's genotypes are no network's weights.
     """
     factor = check_scheme(scheme)
-    check_at_least(0, n=n)
+    n = check_sample(n, domain.genotype_length)
     rng = rng_of(seed)
     shape = (n, domain.genotype_length)
     kind, _, rest = scheme.partition(":")
@@ -62,6 +62,8 @@ def initialise(domain: Domain, scheme: str, n: int, *, seed: int | np.random.Gen
             raise NichechainError(
                 f"elites of {rest} have {elites.shape[1]} parameters, but {domain.name} has {shape[1]}"
             )
+        if not len(elites):
+            raise NichechainError(f"{rest} has no elites, so no walk can begin with one")
         return elites[rng.integers(len(elites), size=n)]
     if kind == "domain":
         sample = domain.sample(n, seed=rng)

@@ -14,7 +14,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from nichechain.core.errors import ArchiveError
-from nichechain.core.files import ARCHIVE_MARK, keep_apart, writing
+from nichechain.core.files import ARCHIVE_MARK, as_path, keep_apart, writing
 from nichechain.core.randomness import Purpose, keyed
 from nichechain.domains.base import Domain
 from nichechain.execution import Executor
@@ -32,6 +32,7 @@ from nichechain.studies.folder import (
     blocks_named,
     finished_blocks,
     read_study,
+    remove_leftovers,
     write_block,
     write_study,
 )
@@ -75,7 +76,7 @@ def run(
     NichechainError
         If the domain is unknown or a start fails to evaluate.
     """
-    folder = Path(folder)
+    folder = as_path("folder", folder)
     domain = domain or study.make_domain()
     with writing(folder):
         keep_apart(folder, ARCHIVE_MARK)
@@ -89,9 +90,7 @@ def run(
             _walk(block, study, domain, folder, executor, lambda n, d=done: _tell(on_progress, d + n))  # type: ignore[misc]
             done += block.evaluations(study.steps)
         remove_checkpoint(folder)
-        # What a crash left half-written.
-        for path in folder.glob("**/*.tmp"):
-            path.unlink(missing_ok=True)
+        remove_leftovers(folder)
 
 
 def _check_extends(old: Study, new: Study, folder: Path) -> None:
@@ -115,13 +114,14 @@ def _blocks_to_walk(folder: Path, study: Study, finished: list[Block]) -> list[B
                 made.append((-1, place, block))
                 walked.update(block.runs)
         together = study.runs if condition.archive_scope == "configuration" else BLOCK
-        left = [run for run in range(study.runs) if run not in walked]
-        while left:
+        first = 0
+        for run in range(study.runs):
             # Runs in a row: a block's name says which it has.
-            length = next((k for k in range(1, len(left)) if left[k] != left[0] + k), len(left))
-            length = min(length, together)
-            made.append((left[0], place, Block(condition, left[0], left[length - 1])))
-            left = left[length:]
+            if run in walked:
+                first = run + 1
+            elif run - first + 1 == together or run + 1 == study.runs or run + 1 in walked:
+                made.append((first, place, Block(condition, first, run)))
+                first = run + 1
     return [block for _, _, block in sorted(made, key=lambda entry: entry[:2])]
 
 

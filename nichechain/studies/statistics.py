@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from nichechain.core.checks import as_floats, check_at_least
+from nichechain.core.checks import as_floats, check_at_least, shown
 from nichechain.core.errors import NichechainError
 from nichechain.core.intervals import LEVEL
 from nichechain.core.randomness import Purpose, keyed
@@ -22,6 +22,10 @@ Floats = NDArray[np.float64]
 Statistic = Callable[..., Any]
 
 RESAMPLES = 1999
+# More would be told from no others, and take hours.
+_MOST_RESAMPLES = 1_000_000
+# Resamples in memory at a time.
+_AT_ONCE = 2000
 """Resamples of every bootstrap."""
 
 
@@ -343,6 +347,8 @@ def _interval(
     from scipy import stats
 
     check_at_least(1, resamples=resamples)
+    if resamples > _MOST_RESAMPLES:
+        raise NichechainError(f"resamples is {resamples}, but must be at most {_MOST_RESAMPLES}")
     # A level with one run cannot be jackknifed, and a bootstrap would repeat that run for ever.
     if min(map(len, samples)) < 2:
         return None
@@ -357,6 +363,7 @@ def _interval(
                 paired=paired,
                 vectorized=True,
                 n_resamples=resamples,
+                batch=_AT_ONCE,
                 confidence_level=LEVEL,
                 method=method,
                 rng=keyed(seed, Purpose.RESAMPLING),
@@ -378,6 +385,8 @@ def _finite(name: str, values: ArrayLike) -> Floats:
 
 
 def _groups(groups: Mapping[str, ArrayLike]) -> dict[str, Floats]:
+    if not isinstance(groups, Mapping):
+        raise NichechainError(f"groups is {shown(groups)}, but must map names to values")
     values = {name: _finite(f"values of {name!r}", group) for name, group in groups.items()}
     if len(values) < 2:
         raise NichechainError(f"there are {len(values)} groups, but a comparison needs at least 2")

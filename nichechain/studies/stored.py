@@ -9,13 +9,17 @@ from typing import Any, Protocol, TypeVar
 
 import pyarrow as pa
 
+from nichechain.archive.untrusted import read_file, read_object
+from nichechain.core.checks import shown
 from nichechain.core.errors import ArchiveError, NichechainError
-from nichechain.core.files import STUDY_MARK, write_atomically
+from nichechain.core.files import STUDY_MARK, as_path, write_atomically
 from nichechain.core.machine import library_versions
 from nichechain.core.parquet import read_parquet
+from nichechain.core.text import printable_values
 
 _FILE = STUDY_MARK
 _FORMAT = 1
+_LARGEST = 1 << 20
 
 Read = TypeVar("Read")
 
@@ -35,7 +39,7 @@ class AnyStudy(Protocol):
 
 def is_study(folder: str | Path) -> bool:
     """Whether a folder holds a study."""
-    return (Path(folder) / _FILE).is_file()
+    return (as_path("folder", folder) / _FILE).is_file()
 
 
 def write_stored(folder: Path, study: AnyStudy, **more: str) -> None:
@@ -62,15 +66,28 @@ def read_stored(folder: Path, read: Callable[[dict[str, Any]], Read], called: st
     """
     path = folder / _FILE
     try:
-        values = json.loads(path.read_text("utf-8"))
+        # It may be a stranger's, as archives may.
+        values = printable_values(read_object(read_file(path, folder, _LARGEST)))
         if values["format"] != _FORMAT:
-            raise ArchiveError(f"{path} has format {values['format']}, but this version reads {_FORMAT}")
+            raise ArchiveError(
+                f"{path} has format {shown(values['format'])}, but this version reads {_FORMAT}"
+            )
         return read(values)
-    except FileNotFoundError:
+    except (FileNotFoundError, NotADirectoryError):
         raise ArchiveError(f"{folder} holds no study: it has no {_FILE}") from None
+    except OSError as error:
+        raise ArchiveError(f"{path} cannot be read: {error.strerror or error}") from error
     except ArchiveError:
         raise
-    except (ValueError, KeyError, TypeError, AttributeError, NichechainError) as error:
+    except (
+        ArithmeticError,
+        AttributeError,
+        KeyError,
+        NichechainError,
+        RecursionError,
+        TypeError,
+        ValueError,
+    ) as error:
         raise ArchiveError(f"{path} is no study of {called}, or damaged: {error}") from error
 
 

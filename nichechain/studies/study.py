@@ -7,7 +7,16 @@ from dataclasses import MISSING, asdict, dataclass, field, fields, replace
 from typing import Any, Literal, get_args
 
 from nichechain import domains
-from nichechain.core.checks import DomainOption, check_at_least, check_choice, plain_options
+from nichechain.core.checks import (
+    DomainOption,
+    as_tuple,
+    check_at_least,
+    check_choice,
+    check_fits,
+    check_text,
+    plain_options,
+    shown,
+)
 from nichechain.core.errors import NichechainError
 from nichechain.domains.base import Domain
 from nichechain.niches import GridNiches
@@ -15,6 +24,8 @@ from nichechain.studies.conditions import Condition, pressure_of
 
 Kind = Literal["pressure", "metrics", "sensitivity", "population"]
 
+# Walks of each condition: their numbers are listed before the first one is walked.
+_MOST_RUNS = 1_000_000
 LEVELS = ("selective", "0.1", "0.25", "0.5", "0.75", "random")
 """Levels of evolutionary pressure that are compared, the strongest first."""
 POPULATION_METRICS, POPULATION_SIZE = ("kde", "knn"), 10
@@ -92,8 +103,16 @@ class Study:
 
     def __post_init__(self) -> None:
         check_choice("kind", self.kind, get_args(Kind))
+        check_text(domain=self.domain)
         check_at_least(1, runs=self.runs)
         check_at_least(0, steps=self.steps, seed=self.seed, domain_seed=self.domain_seed)
+        if self.runs > _MOST_RUNS:
+            raise NichechainError(f"runs is {self.runs}, but must be at most {_MOST_RUNS}")
+        check_fits(steps=self.steps)
+        object.__setattr__(self, "conditions", as_tuple("conditions", self.conditions))
+        for condition in self.conditions:
+            if not isinstance(condition, Condition):
+                raise NichechainError(f"conditions has {shown(condition)}, but must have Conditions")
         slugs = [condition.slug for condition in self.conditions]
         if not slugs:
             raise NichechainError("a study needs at least 1 condition, but has none")
@@ -153,12 +172,12 @@ class Study:
 
 def pressure_conditions(levels: Sequence[str], base: Condition) -> tuple[Condition, ...]:
     """One condition for each level of pressure, alike in all else ("Evolutionary pressure")."""
-    return tuple(replace(base, label=level, level=level) for level in levels)
+    return tuple(replace(base, label=level, level=level) for level in as_tuple("levels", levels))
 
 
 def metric_conditions(metrics: Sequence[str], base: Condition) -> tuple[Condition, ...]:
     """One condition for each diversity metric, alike in all else ("Diversity metrics")."""
-    return tuple(replace(base, label=name, metric=name) for name in metrics)  # type: ignore[arg-type]
+    return tuple(replace(base, label=name, metric=name) for name in as_tuple("metrics", metrics))  # type: ignore[arg-type]
 
 
 def variations(name: str, base: Condition) -> tuple[Condition, ...]:

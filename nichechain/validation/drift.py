@@ -239,6 +239,7 @@ def level_course(
     """
     question = Question(l, lineages, draws=draws, seed=seed)
     check_at_least(2, draws=draws, parts=parts)
+    parts = int(parts)
     counts, steps = _parts(births, niches, parts)
     compared = _observed(counts, min_births)
     grown = [counts[0]]

@@ -129,6 +129,7 @@ def compare_estimators(
     many; ``difference`` compares it with the default on just these.
     """
     check_at_least(2, folds=folds)
+    folds = int(folds)
     families = families_of(counts)
     elite = elites_of(families)
     elites = int(elite.max(initial=-1)) + 1

@@ -67,6 +67,9 @@ class ValidationConfig:
         if self.elites < 3:
             raise NichechainError(f"elites is {self.elites}, but a rank correlation needs at least 3")
         check_permutations(self.permutations)
+        for name in ("elites", "lineages", "l", "offspring", "permutations", "seed"):
+            # Short numbers of NumPy would overflow in what is computed with them.
+            object.__setattr__(self, name, int(getattr(self, name)))
 
     @property
     def evaluations(self) -> int:

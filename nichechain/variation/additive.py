@@ -8,7 +8,15 @@ from typing import Any, Protocol, cast, get_args, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
-from nichechain.core.checks import StepBound, as_tuple, check_choice, check_positive, check_whole, shown
+from nichechain.core.checks import (
+    StepBound,
+    as_tuple,
+    check_choice,
+    check_positive,
+    check_text,
+    check_whole,
+    shown,
+)
 from nichechain.core.errors import NichechainError
 from nichechain.domains.base import Domain, Wrapper
 from nichechain.variation.noise import IndependentNoise, MutationNoise, truncated
@@ -239,6 +247,7 @@ def parse_step_bound(text: str, name: str = "step_bound") -> tuple[StepBound, fl
     NichechainError
         If the text is no such thing.
     """
+    check_text(**{name: text})
     kind, _, size = text.partition(":")
     try:
         bound = Bound(cast(StepBound, kind), float(size))
@@ -258,6 +267,7 @@ def parse_layer_scales(text: str, name: str = "layer_scales") -> tuple[float, ..
     NichechainError
         If the text is no such thing.
     """
+    check_text(**{name: text})
     try:
         scales = tuple(float(part) for part in text.split(","))
     except ValueError:

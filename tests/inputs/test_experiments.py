@@ -27,10 +27,14 @@ from .table import (
     whole,
 )
 
-_BOOTSTRAP = {"seed": SEED, "resamples": whole(0)}
+_BOOTSTRAP = {"seed": SEED, "resamples": (10**9, *whole(0))}
+# What no folder can be called, and what is none.
+_FOLDER = ("/no/such/folder", "/dev/null/folder", "folder" * 100, "a\0b", 3, None, np.zeros(2))
 _RUNS = ([1.0], [[1.0, 2.0, 3.0]], [1.0, np.nan, 2.0], [1.0, np.inf, 2.0], *RAGGED)
 _GROUPS = {"a": [1.0, 2.0, 3.0], "b": [2.0, 4.0, 5.0]}
 _BAD_GROUPS = (
+    3,
+    [[1.0, 2.0], [3.0, 4.0]],
     {},
     {"a": [1.0, 2.0]},
     {"a": [1.0], "b": [1.0, 2.0]},
@@ -46,17 +50,17 @@ CALLS = (
         "studies.Condition",
         lambda w: {"label": "a"},
         {
-            "label": ("", "--"),
-            "level": (*UNKNOWN, "1.5", "0", "nan"),
+            "label": ("", "--", "a\x1b[31m", "a" * 101, b"a", 3, np.zeros(2)),
+            "level": (*UNKNOWN, "1.5", "0", "nan", 10**400, np.zeros(2)),
             "metric": UNKNOWN,
             "offspring": whole(0),
             "mutation": UNKNOWN,
             "scale": POSITIVE,
-            "step_bound": ("rescaled", "rescaled:0", "no-such-kind:1"),
+            "step_bound": ("rescaled", "rescaled:0", "no-such-kind:1", 3, np.zeros(2)),
             "k": whole(0),
             "mode": UNKNOWN,
             "archive_limit": whole(0),
-            "archive_scope": UNKNOWN,
+            "archive_scope": (*UNKNOWN, np.zeros(2)),
             "states": whole(0),
             "litter": whole(0),
             "initialisation": (*UNKNOWN, "normal:0", "normal:x", "elites:"),
@@ -80,12 +84,12 @@ CALLS = (
         },
         {
             "kind": UNKNOWN,
-            "conditions": ((), (_LABEL, _LABEL)),
+            "conditions": ((), (_LABEL, _LABEL), 3, ("a",)),
             "runs": whole(0),
             "steps": whole(-1),
             "seed": SEED,
             "domain_seed": SEED,
-            "shape": ((2,), (0, 2), ("a", 2)),
+            "shape": ((2,), (0, 2), ("a", 2), (10**30, 2)),
             "bounds": (((0, 1),), ((1, 0), (0, 1)), "0,1"),
         },
     ),
@@ -102,18 +106,20 @@ CALLS = (
         },
         {"conditions": ((_LABEL,), (Condition("a", states=1),))},
     ),
-    Call("studies.pressure_of", lambda w: {"level": "0.5"}, {"level": ("better", "2", *UNKNOWN)}),
-    Call("studies.selection_of", lambda w: {"level": "0.5"}, {"level": ("0", "2", *UNKNOWN)}),
-    Call("studies.condition_seed", lambda w: {"seed": 0, "label": "a"}, {"seed": SEED}),
+    Call(
+        "studies.pressure_of", lambda w: {"level": "0.5"}, {"level": ("better", "2", np.zeros(2), *UNKNOWN)}
+    ),
+    Call("studies.selection_of", lambda w: {"level": "0.5"}, {"level": ("0", "2", np.zeros(2), *UNKNOWN)}),
+    Call("studies.condition_seed", lambda w: {"seed": 0, "label": "a"}, {"seed": SEED, "label": (3,)}),
     Call(
         "studies.pressure_conditions",
         lambda w: {"levels": ("0.5",), "base": _LABEL},
-        {"levels": (("2",), ("no-such-thing",))},
+        {"levels": (3, ("2",), ("no-such-thing",))},
     ),
     Call(
         "studies.metric_conditions",
         lambda w: {"metrics": ("knn",), "base": _LABEL},
-        {"metrics": (("no-such-thing",),)},
+        {"metrics": (3, ("no-such-thing",))},
     ),
     Call("studies.variations", lambda w: {"name": "k", "base": _LABEL}, {"name": UNKNOWN}),
     Call(
@@ -121,18 +127,21 @@ CALLS = (
         lambda w: {"domain": w.arm, "scheme": "normal:0.1", "n": 2, "seed": 0},
         {
             "scheme": (*UNKNOWN, "normal:-1", "orthogonal", "elites:/no/such/folder"),
-            "n": whole(-1),
+            "n": (10**30, *whole(-1)),
             "seed": SEED,
         },
     ),
-    Call("studies.read_study", lambda w: {"folder": w.study}, {"folder": ("/no/such/folder",)}),
-    Call("studies.read_records", lambda w: {"folder": w.study}, {"folder": ("/no/such/folder",)}),
-    Call("studies.read_births", lambda w: {"folder": w.study}, {"folder": ("/no/such/folder",)}),
+    Call("studies.read_study", lambda w: {"folder": w.study}, {"folder": _FOLDER}),
+    Call("studies.read_records", lambda w: {"folder": w.study}, {"folder": _FOLDER}),
+    Call("studies.read_births", lambda w: {"folder": w.study}, {"folder": _FOLDER}),
     Call(
         "studies.searches.SelectionStudy",
         lambda w: {"config": w.config},
         {
-            "selections": ((), ("reach",), ("uniform", "uniform"), ("uniform", "no-such-thing"), "uniform"),
+            "selections": (
+                *((), ("reach",), ("uniform", "uniform"), ("uniform", "no-such-thing")),
+                *("uniform", 3, np.zeros(2), ("uniform", 3)),
+            ),
             "runs": whole(1),
             "elites": whole(-1),
             "offspring": whole(1),
@@ -141,11 +150,9 @@ CALLS = (
     Call(
         "studies.searches.run_searches",
         lambda w: {"study": w.selection_study, "folder": w.selections, "executor": w.here},
-        {"folder": (Made(lambda w: w.log, "a-file"),)},
+        {"folder": (Made(lambda w: w.log, "a-file"), 3, "folder" * 100, "a\0b")},
     ),
-    Call(
-        "studies.searches.read_searches", lambda w: {"folder": w.selections}, {"folder": ("/no/such/folder",)}
-    ),
+    Call("studies.searches.read_searches", lambda w: {"folder": w.selections}, {"folder": _FOLDER}),
     Call(
         "studies.searches.compare_selections",
         lambda w: {"study": w.selection_study, "records": read_searches(w.selections)[1]},

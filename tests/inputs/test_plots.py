@@ -26,8 +26,8 @@ from .table import (
 )
 
 _THRESHOLD = (-0.1, 1.5, *NOT_A_NUMBER)
-_NO_NICHES = ([], list(range(20)), [99], [(9, 9)])
-_WALKS = {"measure": UNKNOWN, "conditions": (["no-such-condition"],)}
+_NO_NICHES = ([], list(range(20)), [99], [(9, 9)], 3, np.array(3))
+_WALKS = {"measure": UNKNOWN, "conditions": (["no-such-condition"], 3, np.array(3)), "unit": (3, np.zeros(2))}
 
 
 def _no_runs(w: World) -> Any:
@@ -38,7 +38,8 @@ def _motion() -> Motion:
     return Motion({"hand": np.zeros((3, 2))}, None, 10.0)
 
 
-_EMPTY = (Made(_no_runs, "no-runs"),)
+_RECORDS = (Made(_no_runs, "no-runs"), Made(lambda w: w.births, "births"), 3, {}, np.zeros(3))
+_STEP = (-1, 99, "last", 0.0, np.zeros(2))
 
 CALLS = (
     Call(
@@ -47,15 +48,21 @@ CALLS = (
         {
             "niches": _NO_NICHES,
             "lineages": whole(0),
-            "longest": whole(0),
-            "draws": whole(0),
+            "longest": (2**63, *whole(0)),
+            "draws": (10**400, *whole(0)),
             "seed": LINEAGES["seed"],
         },
     ),
     Call(
         "plots.plot_lineages",
         lambda w: {"chain": w.chain, "ax": w.axes(), "niches": [0], "l": 2, "most": 10, "draws": 1},
-        {"niches": _NO_NICHES, "l": whole(0), "most": whole(1), "draws": whole(0), "seed": LINEAGES["seed"]},
+        {
+            "niches": _NO_NICHES,
+            "l": whole(0),
+            "most": (2**63, *whole(1)),
+            "draws": (2**63, *whole(0)),
+            "seed": LINEAGES["seed"],
+        },
     ),
     Call(
         "plots.plot_reachability",
@@ -99,24 +106,31 @@ CALLS = (
         lambda w: {"check": w.check, "ax": w.axes(), "generation": 1},
         {"generation": (*whole(0), 3)},
     ),
-    Call("plots.plot_walks", lambda w: {"records": w.records, "ax": w.axes()}, {"records": _EMPTY, **_WALKS}),
+    Call(
+        "plots.plot_walks", lambda w: {"records": w.records, "ax": w.axes()}, {"records": _RECORDS, **_WALKS}
+    ),
     Call(
         "plots.plot_runs",
         lambda w: {"records": w.records, "ax": w.axes(), "step": 0},
-        {"records": _EMPTY, "step": (-1, 99, "last"), **_WALKS},
+        {"records": _RECORDS, "step": _STEP, **_WALKS},
     ),
     Call(
         "plots.plot_filled",
         lambda w: {"records": read_searches(w.selections)[1].to_pandas(), "ax": w.axes()},
-        {"records": (Made(lambda w: w.births, "births"),), "selections": (("no-such-thing",),)},
+        {
+            "records": (Made(lambda w: w.births, "births"), 3, {}, np.zeros(3)),
+            "selections": (("no-such-thing",), 3, (10**30,), (np.zeros(2),)),
+        },
     ),
     Call(
         "plots.draw_study",
         lambda w: {"records": w.records, "step": 0},
         {
-            "records": _EMPTY,
-            "step": (-1, 99, "last"),
+            "records": _RECORDS,
+            "step": _STEP,
             "conditions": _WALKS["conditions"],
+            "unit": (3,),
+            "title": (3,),
             "main": ("no-such-thing",),
         },
     ),
@@ -128,8 +142,9 @@ CALLS = (
             "l": (10_000, *whole(0)),
             "lineages": (10**9, *whole(0)),
             "draws": whole(0),
-            "films": ("/no/such/folder",),
-            "beside": (1, ("one",)),
+            "films": ("/no/such/folder", 3),
+            "out": (Made(lambda w: w.folder, "a-folder"), 3, "a" * 300),
+            "beside": (1, ("one",), (1, 2)),
         },
     ),
 )

@@ -12,13 +12,15 @@ import json
 from collections.abc import Callable
 from importlib.resources import files
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from nichechain.archive.archive import Archive
+from nichechain.chain import NicheChain
 from nichechain.chain.structure.graph import LONG_JUMP
 from nichechain.core.errors import NichechainError
-from nichechain.core.files import write_atomically
+from nichechain.core.files import as_path, replace_file
 from nichechain.evolvability.by_generation import evolvability_table
 from nichechain.evolvability.question import DRAWS, MOST_EXACT, Question
 from nichechain.niches import GridNiches
@@ -26,10 +28,6 @@ from nichechain.plots.cells import voronoi_cells
 from nichechain.plots.explorer.packing import in_steps, packed
 from nichechain.plots.explorer.past import past
 from nichechain.plots.explorer.transitions import LONGEST, observed, transition
-
-if TYPE_CHECKING:
-    from nichechain.archive.archive import Archive
-    from nichechain.chain import NicheChain
 
 # One program in parts: they see each other's names.
 _PROGRAM = ("chain.js", "shown.js", "map.js", "arrows.js", "panel.js", "saved.js", "page.js")
@@ -89,15 +87,17 @@ def write_explorer(
         If a number is out of range, behavior does not have two axes, there are too many niches, or a
         film is of no niche.
     """
+    out = as_path("out", out)
     options: dict[str, Any] = {"l": l, "lineages": lineages, "draws": draws, "seed": seed, "on_done": on_done}
-    text = explorer_page(archive, chain, films=None if films is None else Path(films), **options)
+    text = explorer_page(archive, chain, films=None if films is None else as_path("films", films), **options)
     if beside is not None:
-        if not (isinstance(beside, tuple) and len(beside) == 2):
+        kinds = tuple(map(type, beside)) if isinstance(beside, tuple) else ()
+        if not (len(kinds) == 2 and issubclass(kinds[0], Archive) and issubclass(kinds[1], NicheChain)):
             raise NichechainError("beside must be an archive and its chain, as a pair")
         pages = [text, explorer_page(*beside, **options)]
         names = " and ".join(one.folder.resolve().name for one in (archive, beside[0]))
         text = _filled_in("beside.html", {"NAMES": _as_data(names), "DATA": _as_data(pages)})
-    write_atomically(out, text.encode())
+    replace_file(out, text.encode())
 
 
 def explorer_page(

@@ -11,7 +11,7 @@ from pathlib import Path
 import pyarrow as pa
 
 from nichechain.core.errors import ArchiveError
-from nichechain.core.files import ARCHIVE_MARK, keep_apart, write_atomically
+from nichechain.core.files import ARCHIVE_MARK, as_path, keep_apart, write_atomically
 from nichechain.core.parquet import parquet_bytes
 from nichechain.studies.searches.study import OneSearch, SelectionStudy
 from nichechain.studies.stored import check_continues, is_study, read_rows, read_stored, write_stored
@@ -49,7 +49,8 @@ def read_study(folder: str | Path) -> SelectionStudy:
     ArchiveError
         If there is none, it is damaged, or of another kind or version.
     """
-    return read_stored(Path(folder), lambda values: SelectionStudy.from_json(values["study"]), "selections")
+    path = as_path("folder", folder)
+    return read_stored(path, lambda values: SelectionStudy.from_json(values["study"]), "selections")
 
 
 def archive_of(folder: Path, search: OneSearch) -> Path:
@@ -90,7 +91,7 @@ def read_searches(folder: str | Path) -> tuple[SelectionStudy, pa.Table]:
     ArchiveError
         If there is no such study, a file is damaged, or no search is finished.
     """
-    folder = Path(folder)
+    folder = as_path("folder", folder)
     study = read_study(folder)
     tables = []
     for search in study.searches():

@@ -12,6 +12,7 @@ from pathlib import Path
 
 from nichechain.archive.archive import load
 from nichechain.archive.building import build
+from nichechain.core.files import as_path
 from nichechain.domains.base import Domain
 from nichechain.execution import Executor
 from nichechain.search.making import make_domain
@@ -55,7 +56,7 @@ def run_searches(
     """
     from filelock import FileLock, Timeout
 
-    folder = Path(folder)
+    folder = as_path("folder", folder)
     domain = domain or make_domain(study.config)
     begin(study, folder)
     each = study.config.evaluations + study.elites * study.offspring

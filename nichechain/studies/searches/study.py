@@ -6,7 +6,7 @@ import re
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
-from nichechain.core.checks import check_at_least, shown
+from nichechain.core.checks import as_tuple, check_at_least, check_text, shown
 from nichechain.core.errors import NichechainError
 from nichechain.search.config import BuildConfig
 
@@ -78,7 +78,8 @@ class SelectionStudy:
             raise NichechainError(
                 f"selections is {shown(self.selections)}, but must be several, such as ('uniform', 'reach')"
             )
-        object.__setattr__(self, "selections", tuple(self.selections))
+        object.__setattr__(self, "selections", as_tuple("selections", self.selections))
+        check_text(**{f"selection {k}": name for k, name in enumerate(self.selections)})
         if REFERENCE not in self.selections:
             raise NichechainError(
                 f"selections are {', '.join(map(str, self.selections))}, but must include {REFERENCE}, "

@@ -70,7 +70,7 @@ class ArchiveRule:
             ("entry", self.entry, get_args(Entry)),
             ("scope", self.scope, get_args(Scope)),
         ):
-            if value not in allowed:
+            if not isinstance(value, str) or value not in allowed:
                 raise NichechainError(f"archive {name} is {shown(value)}, but must be {' or '.join(allowed)}")
 
     @property
