@@ -21,7 +21,7 @@ from nichechain.chain.estimators import estimate, refitted, with_posterior
 from nichechain.chain.families import counts_of_families, families_of
 from nichechain.chain.model import NicheChain
 from nichechain.chain.posterior import DirichletPosterior
-from nichechain.core.checks import check_at_least, check_numbers
+from nichechain.core.checks import check_at_least, check_fits, check_numbers
 from nichechain.core.errors import NichechainError
 from nichechain.core.intervals import drawn_interval
 from nichechain.core.randomness import Purpose, keyed
@@ -182,6 +182,7 @@ def bootstrap_elites(
     """
     question = Question(l, lineages, convention, draws=draws, seed=seed)
     check_at_least(2, resamples=resamples)
+    check_fits(resamples=resamples)
     if not len(counts.families):
         raise NichechainError(
             "these births do not say whose children they are, so elites cannot be resampled"

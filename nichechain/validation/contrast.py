@@ -19,7 +19,7 @@ from nichechain.births.table import LINEAGE, NONE, check_columns
 from nichechain.chain.counts import TransitionCounts
 from nichechain.chain.estimators import estimate, refitted
 from nichechain.chain.lineages import fitted_law
-from nichechain.core.checks import check_at_least, shown
+from nichechain.core.checks import check_at_least, check_fits, shown
 from nichechain.core.errors import NichechainError
 from nichechain.core.randomness import Purpose, keyed
 from nichechain.evolvability.coverage import rarefied_coverage
@@ -174,6 +174,7 @@ def contrast(
     """
     question = Question(l, lineages, draws=draws, seed=seed)
     check_at_least(2, resamples=resamples)
+    check_fits(resamples=resamples)
     check_at_least(0, min_births=min_births)
     first, second = _pooled("first", first), _pooled("second", second)
     recorded = len(first), len(second)
@@ -202,7 +203,7 @@ def contrast(
             f"no niche has {min_births} births behind its row of T in both groups: lower min_births"
         )
     chains = [estimate(counts) for counts in whole]
-    question.warn_if_long(chains[0], min(compared.size, MOST_ROOTS), 2 * resamples * draws)
+    question.warn_if_long(chains[0], min(compared.size, MOST_ROOTS), 2 * int(resamples) * question.draws)
     size = min(int(counts.visits.sum()) for counts in whole)
     values, spreads, freedom = [], [], []
     for number, (side, counts, chain) in enumerate(zip(sides, whole, chains, strict=True)):

@@ -15,7 +15,7 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from nichechain.core.checks import check_at_least
+from nichechain.core.checks import check_at_least, check_fits
 from nichechain.core.randomness import Purpose, keyed
 from nichechain.validation.lineages import Triples
 from nichechain.validation.rollouts import OnDone
@@ -303,6 +303,7 @@ def p_value(observed: float, permuted: Floats) -> float:
 def check_permutations(permutations: int) -> None:
     """Refuse a permutation test without permutations."""
     check_at_least(1, permutations=permutations)
+    check_fits(permutations=permutations)
 
 
 def _xlogx(n: Ints | Floats) -> Floats:
