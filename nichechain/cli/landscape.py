@@ -316,9 +316,10 @@ def _show_correlations(compared: dict[str, Any]) -> None:
         return
     table = output.table("measure", "Spearman", "p", "n", title=f"Rank correlation with {of} of the niche")
     for entry in compared["spearman"]:
+        rho = "-" if entry["rho"] is None else f"{entry['rho']:.2f}"
         p_value = "-" if entry["p_value"] is None else f"{entry['p_value']:.2g}"
         measure = MEASURES[entry["measure"]]
-        table.add_row(f"{measure.title}, {measure.symbol}", _number(entry["rho"]), p_value, str(entry["n"]))
+        table.add_row(f"{measure.title}, {measure.symbol}", rho, p_value, str(entry["n"]))
     shown.print(table)
     shown.print(
         f"[dim]{compared['lineages']} lineages; convention: {compared['convention']}; estimator: "
