@@ -26,7 +26,9 @@ def read_parquet(source: Path | pa.NativeFile, *, checksums: bool = False) -> pa
     OSError, pyarrow.ArrowException
         If it cannot be read.
     """
-    with pq.ParquetFile(source, pre_buffer=False, page_checksum_verification=checksums) as file:
+    # A name with a colon would pass for an address on the net.
+    opened = pa.OSFile(str(source)) if isinstance(source, Path) else source
+    with opened, pq.ParquetFile(opened, pre_buffer=False, page_checksum_verification=checksums) as file:
         return file.read(use_threads=False)
 
 

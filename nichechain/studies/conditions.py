@@ -72,6 +72,9 @@ class Condition(WalkSettings):
             )
         check_at_least(1, litter=self.litter)
         check_scheme(self.initialisation)
+        # Those of other metrics are written with the study as well.
+        diversity.KNearest(self.k)
+        diversity.KernelDensity(self.bandwidth, self.mode, self.decay)
         self.walk_config(0)
         self.mutate()
 

@@ -68,8 +68,8 @@ CALLS = (
     ),
     Call(
         "studies.Condition",
-        lambda w: {"label": "a", "metric": "kde"},
-        {"bandwidth": POSITIVE, "decay": (0.0, 1.1, *NOT_A_NUMBER)},
+        lambda w: {"label": "a", "metric": "parent"},
+        {"bandwidth": POSITIVE, "decay": (0.0, 1.1, *NOT_A_NUMBER), "k": whole(0)},
     ),
     Call(
         "studies.Study",
