@@ -36,6 +36,10 @@ class ValidateCommand:
     cache_memory: parsing.CacheMemory = None
     out: Annotated[Path | None, parsing.option("DIR", "NAME-validation")] = None
     """Folder for validation.json, calibration.png and lineages.csv."""
+    resume: bool = False
+    """Go on with lineages that were interrupted."""
+    force: bool = False
+    """Start over where there are some."""
 
 
 def run(arguments: Sequence[str]) -> int:
@@ -56,23 +60,39 @@ def run(arguments: Sequence[str]) -> int:
     out = command.out or Path(f"{archive.folder.name}-validation")
     if out.exists() and not out.is_dir():
         raise NichechainError(f"--out is {str(out)!r}, but that is a file, not a folder")
-    with (
-        workers.hired(command.workers, command.cache_memory) as executor,
-        progress.stages() as tell,
-    ):
-        result = validate(
-            archive,
-            executor,
-            config,
-            on_done=progress.more(tell, "evaluations", config.evaluations),
-            on_permuted=progress.more(tell, "permutations", config.permuted),
-            on_drawn=progress.more(tell, "draws of T", DRAWS),
-        )
+    keep = out.with_name(f"{out.name}.partial")
+    if command.resume and command.force:
+        raise NichechainError("--resume and --force exclude each other: go on, or start over")
+    if keep.exists() and not command.resume:
+        if not command.force:
+            raise NichechainError(
+                f"{keep} holds interrupted lineages: --resume goes on with them, --force starts over"
+            )
+        keep.unlink()
+    try:
+        with (
+            workers.hired(command.workers, command.cache_memory) as executor,
+            progress.stages() as tell,
+        ):
+            result = validate(
+                archive,
+                executor,
+                config,
+                keep=keep,
+                on_done=progress.more(tell, "evaluations", config.evaluations),
+                on_permuted=progress.more(tell, "permutations", config.permuted),
+                on_drawn=progress.more(tell, "draws of T", DRAWS),
+            )
+    except KeyboardInterrupt:
+        kept = f"lineages are kept in {keep}. To go on, add --resume."
+        output.console().print(f"Stopped; {kept if keep.exists() else 'nothing is evaluated yet.'}")
+        return 130
     # Made only now, so that bad input leaves nothing behind.
     out.mkdir(parents=True, exist_ok=True)
     replace_file(out / "validation.json", (json.dumps(result.to_json(), indent=2) + "\n").encode())
     replace_file(out / "lineages.csv", result.direct.lineages.to_frame().to_csv(index=False).encode())
     _draw(result, out / "calibration.png")
+    keep.unlink(missing_ok=True)
     _show(result, config)
     output.console().print(f"wrote validation.json, calibration.png and lineages.csv to {out}")
     return 0

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -122,6 +123,7 @@ def validate(
     executor: Executor,
     config: ValidationConfig | None = None,
     *,
+    keep: Path | None = None,
     on_done: OnDone | None = None,
     on_permuted: OnDone | None = None,
     on_drawn: OnDone | None = None,
@@ -134,8 +136,11 @@ def validate(
     executor : Executor
         Where lineages are evaluated.
     config : ValidationConfig, optional
+    keep : Path, optional
+        A file to keep lineages in, should they be interrupted; see
+        :func:`~nichechain.validation.run_lineages`.
     on_done : callable, optional
-        Told how many more genotypes have been evaluated.
+        Told how many more genotypes have been evaluated, or were kept.
     on_permuted, on_drawn : callable, optional
         Told how many more permutations, and draws of T, are done.
 
@@ -170,6 +175,7 @@ def validate(
         lineages=config.lineages,
         offspring=config.offspring,
         seed=config.seed,
+        keep=keep,
         on_done=on_done,
     )
     triples = Triples.from_births(archive.births())

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,10 +16,13 @@ from nichechain.births.table import NONE, niches_of
 from nichechain.chain.model import NicheChain
 from nichechain.core.checks import check_at_least, check_seed, check_whole
 from nichechain.core.errors import NichechainError
+from nichechain.core.machine import library_versions, machine
 from nichechain.core.randomness import Purpose, keyed
 from nichechain.evolvability.niches import answer_for_niches
 from nichechain.evolvability.question import Question
 from nichechain.execution import Executor
+from nichechain.niches.plain import to_plain
+from nichechain.validation.evaluated import Evaluated
 from nichechain.variation.unborn import Unborn, litters
 
 if TYPE_CHECKING:
@@ -138,6 +143,7 @@ def run_lineages(
     lineages: int,
     offspring: int = OFFSPRING,
     seed: int = 0,
+    keep: Path | None = None,
     on_done: OnDone | None = None,
 ) -> Lineages:
     """Mutate and evaluate: U lineages of l generations from each elite, and m more children.
@@ -155,8 +161,11 @@ def run_lineages(
     l, lineages, offspring : int
         At least 1.
     seed : int
+    keep : Path, optional
+        A file to keep what is evaluated in, should the evaluation be interrupted. What it holds is not
+        evaluated again.
     on_done : callable, optional
-        Told how many more have been evaluated; R·(l·U + m) in all, but for failures.
+        Told how many more have been evaluated, or were kept; R·(l·U + m) in all, but for failures.
 
     Returns
     -------
@@ -165,7 +174,7 @@ def run_lineages(
     Raises
     ------
     NichechainError
-        If a number is out of range or a niche is empty.
+        If a number is out of range, a niche is empty, or the file does not fit.
     """
     check_at_least(1, l=l, lineages=lineages, offspring=offspring)
     check_seed(seed)
@@ -176,9 +185,11 @@ def run_lineages(
         )
     elites = np.stack([archive.elite(int(root)).genotype for root in roots])
     mutate, niches = archive.mutate, archive.niches
+    sizes = {"l": l, "lineages": lineages, "offspring": offspring, "seed": seed}
+    evaluated = Evaluated(keep, {**sizes, **_provenance(archive, roots, elites)} if keep else {}, on_done)
 
-    def born(children: Unborn) -> Ints:
-        return niches_of(executor.evaluate(archive.domain, children, on_done), niches)
+    def land(children: Unborn, tell: OnDone | None) -> Ints:
+        return niches_of(executor.evaluate(archive.domain, children, tell), niches)
 
     states = np.full((len(elites), lineages, l), NONE, np.int64)
     # Elite and number of each lineage under way, its latest genotype, and where that stands among them.
@@ -191,7 +202,7 @@ def run_lineages(
         number = [_birth(int(roots[r]), u, generation) for r, u in whose]
         seeds = (seed,) * len(genotypes)
         children = Unborn(mutate, Purpose.LINEAGE, genotypes, seeds, at, np.array(number, np.int64))
-        landed = born(children)
+        landed = evaluated.of(children, land)
         states[elite, lineage, generation] = landed
         alive = landed != NONE
         elite, lineage = elite[alive], lineage[alive]
@@ -199,8 +210,19 @@ def run_lineages(
             genotypes, at = children[alive].grow(), np.arange(len(elite))
     if niches.outside == "absorb":
         states = _absorbed(states, len(niches))
-    further = born(litters(mutate, Purpose.OFFSPRING, elites, seed, offspring))
+    further = evaluated.of(litters(mutate, Purpose.OFFSPRING, elites, seed, offspring), land)
     return Lineages(np.asarray(roots, np.int64), states, further.reshape(len(elites), offspring))
+
+
+def _provenance(archive: Archive, roots: Ints, elites: Float32s) -> dict[str, Any]:
+    """What decides where lineages go, besides their number, length and seed."""
+    return {
+        "elites": [np.asarray(roots).tolist(), hashlib.sha256(elites.tobytes()).hexdigest()],
+        "configuration": archive.config.to_json(),
+        "niches": to_plain(archive.niches),
+        "versions": library_versions(),
+        "machine": machine(),
+    }
 
 
 def niches_reached(states: Ints, niches: int) -> Ints:

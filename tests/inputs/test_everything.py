@@ -240,6 +240,8 @@ EXEMPT: dict[tuple[str, str], str] = {
         ("studies.running.run", "folder", _LATER),
         ("studies.study.Study", "domain domain_options", _LATER),
         ("landscape.archives.measure_archive", "keep", _LATER),
+        ("validation.rollouts.run_lineages", "keep", _LATER),
+        ("validation.report.validate", "keep", _LATER),
         (
             "pyribs.recording.Recording",
             "emitters outside strategy_parent",
