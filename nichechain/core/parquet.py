@@ -26,8 +26,8 @@ def read_parquet(source: Path | pa.NativeFile, *, checksums: bool = False) -> pa
     OSError, pyarrow.ArrowException
         If it cannot be read.
     """
-    # A name with a colon would pass for an address on the net.
-    opened = pa.OSFile(str(source)) if isinstance(source, Path) else source
+    # A name with a colon would pass for an address on the net, and one that is not UTF-8 for none.
+    opened = pa.BufferReader(source.read_bytes()) if isinstance(source, Path) else source
     with opened, pq.ParquetFile(opened, pre_buffer=False, page_checksum_verification=checksums) as file:
         return file.read(use_threads=False)
 

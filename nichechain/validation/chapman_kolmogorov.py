@@ -52,7 +52,7 @@ def births_test(
     NichechainError
         If ``permutations`` is below 1.
     """
-    check_permutations(permutations)
+    permutations = check_permutations(permutations)
     known = triples.with_grandparent
     name = "Chapman-Kolmogorov, w T"
     everything = int(np.unique(known.niche).size), len(known)
@@ -106,7 +106,8 @@ def lineages_test(
     NichechainError
         If there are no two generations, or ``permutations`` is below 1.
     """
-    check_permutations(permutations)
+    permutations = check_permutations(permutations)
+    states = np.asarray(states)
     if states.ndim != 2 or states.shape[1] < 3:
         raise NichechainError(f"lineages have shape {states.shape}, but must be (N, l + 1) with l at least 2")
     # A failed birth is a state like any other, which is never left.

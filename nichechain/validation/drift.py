@@ -290,6 +290,8 @@ def _parts(births: pa.Table, niches: Niches, parts: int) -> tuple[list[Transitio
         raise NichechainError(
             f"{missing} of {len(births)} births do not say their step: no early and late ones"
         )
+    if parts > len(births):
+        raise NichechainError(f"parts is {parts}, but there are only {len(births)} births")
     step = births["step"].to_numpy().astype(np.int64)
     part = np.empty(step.size, np.int64)
     part[np.argsort(step, kind="stable")] = np.arange(step.size) * parts // step.size

@@ -15,7 +15,8 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from nichechain.core.checks import check_at_least, check_fits
+from nichechain.core.checks import check_at_least
+from nichechain.core.errors import NichechainError
 from nichechain.core.randomness import Purpose, keyed
 from nichechain.validation.lineages import Triples
 from nichechain.validation.rollouts import OnDone
@@ -24,6 +25,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 PERMUTATIONS = 499
+_MOST_PERMUTATIONS = 10_000_000
 DEPTH_BINS = 3
 
 
@@ -274,7 +276,7 @@ def _permuted(
     on_done: OnDone | None,
 ) -> MarkovTest:
     """The test of a statistic of labels."""
-    check_permutations(permutations)
+    permutations = check_permutations(permutations)
     facts = (tables.niches, tables.births, tables.all_niches, tables.all_births)
     if not tables.births:
         return MarkovTest(name, 0.0, 0.0, 1.0, permutations, *facts)
@@ -300,10 +302,12 @@ def p_value(observed: float, permuted: Floats) -> float:
     return float((1 + np.count_nonzero(permuted >= observed - slack)) / (1 + permuted.size))
 
 
-def check_permutations(permutations: int) -> None:
-    """Refuse a permutation test without permutations."""
+def check_permutations(permutations: int) -> int:
+    """The number, unless a test would be without permutations, or with more than memory is for."""
     check_at_least(1, permutations=permutations)
-    check_fits(permutations=permutations)
+    if permutations > _MOST_PERMUTATIONS:
+        raise NichechainError(f"permutations is {permutations}, but must be at most {_MOST_PERMUTATIONS}")
+    return int(permutations)
 
 
 def _xlogx(n: Ints | Floats) -> Floats:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from nichechain.archive.archive import Archive
 from nichechain.births.table import NONE, niches_of
 from nichechain.chain.model import NicheChain
-from nichechain.core.checks import check_at_least, check_seed, check_whole
+from nichechain.core.checks import as_whole, check_at_least, check_seed, check_whole
 from nichechain.core.errors import NichechainError
 from nichechain.core.machine import library_versions, machine
 from nichechain.core.randomness import Purpose, keyed
@@ -121,7 +121,11 @@ def sample_roots(
     check_whole(elites=size, min_births=min_births)
     if size < 3:
         raise NichechainError(f"elites are {size}, but a rank correlation needs at least 3")
-    assert chain.births is not None
+    if chain.births is None:
+        raise NichechainError("this chain was given, but roots are chosen by the births behind one")
+    filled = as_whole("filled", filled)
+    if filled.size and not 0 <= filled.min() <= filled.max() < chain.states:
+        raise NichechainError(f"filled has values that are no states, which are 0 to {chain.states - 1}")
     niches = filled[(filled < chain.n_niches) & (chain.births[filled] >= min_births)]
     if niches.size < 3:
         raise NichechainError(
@@ -178,6 +182,9 @@ def run_lineages(
     """
     check_at_least(1, l=l, lineages=lineages, offspring=offspring)
     check_seed(seed)
+    # Short numbers of NumPy would overflow.
+    l, lineages, offspring = int(l), int(lineages), int(offspring)
+    roots = np.atleast_1d(as_whole("roots", roots))
     most = _MOST_STATES // max(1, len(roots) * lineages)
     if l > most:
         raise NichechainError(

@@ -12,7 +12,7 @@ from nichechain.core.parquet import parquet_bytes, read_parquet
 TABLE = pa.table({"run": [0, 1, 2], "label": ["a", None, "c"]})
 
 
-@pytest.mark.parametrize("name", ["rows.parquet", "seed:1/rows.parquet", "s3:rows.parquet", "a b?c#%20"])
+@pytest.mark.parametrize("name", ["rows", "seed:1/rows.parquet", "s3:rows", "a b?c#%20", "\udcff"])
 def test_a_name_is_no_address(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     path = Path(name)

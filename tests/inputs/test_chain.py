@@ -249,7 +249,7 @@ CALLS = (
         {
             "births": (Made(lambda w: w.table.slice(0, 0), "no-births"),),
             "niches": (_OTHER,),
-            "parts": whole(1),
+            "parts": (10**30, 10**9, *whole(1)),
             "min_births": (*whole(-1)[1:], 10_000),
             "draws": whole(1),
             **LINEAGES,

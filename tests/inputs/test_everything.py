@@ -228,7 +228,6 @@ EXEMPT: dict[tuple[str, str], str] = {
         ("search.making.make_niches", "centroids", _WITHIN),
         ("plots.graphs.plot_wormholes", "found", _WITHIN),
         ("evolvability.reach.visit_probability", "first steps", _WITHIN),
-        ("validation.rollouts.sample_roots", "filled", _WITHIN),
         ("walks.state.record_table", "records", _WITHIN),
         (
             "domains.registry.make",

@@ -43,7 +43,7 @@ _BAD_GROUPS = (
     {"a": "three", "b": [1.0, 2.0]},
 )
 _LABEL = Condition("a")
-_TEST = {"permutations": whole(0), "seed": SEED}
+_TEST = {"permutations": (10**9, *whole(0)), "seed": SEED}
 
 CALLS = (
     Call(
@@ -156,7 +156,7 @@ CALLS = (
     Call(
         "studies.searches.compare_selections",
         lambda w: {"study": w.selection_study, "records": read_searches(w.selections)[1]},
-        {"records": (Made(lambda w: read_searches(w.selections)[1].slice(0, 0), "no-search"),)},
+        {"records": (Made(lambda w: read_searches(w.selections)[1].slice(0, 0), "no-search"), 3, {})},
     ),
     Call(
         "studies.statistics.pressure_test",
@@ -199,6 +199,8 @@ CALLS = (
         "validation.sample_roots",
         lambda w: {"chain": w.chain, "filled": w.filled, "size": 3, "l": 2, "lineages": 5, "min_births": 0},
         {
+            "chain": (Made(lambda w: w.given, "given"),),
+            "filled": ([10_000], ["a"], [0.5], [-1]),
             "size": whole(2),
             "l": whole(0),
             "lineages": whole(0),
@@ -217,7 +219,7 @@ CALLS = (
             "offspring": 2,
         },
         {
-            "roots": (Made(lambda w: np.array([10_000]), "no-such-state"),),
+            "roots": (Made(lambda w: np.array([10_000]), "no-such-state"), ["a"], [np.nan], [0.5]),
             "l": (10**30, *whole(0)),
             "lineages": whole(0),
             "offspring": whole(0),

@@ -9,6 +9,7 @@ import pandas as pd
 import pyarrow as pa
 from numpy.typing import NDArray
 
+from nichechain.core.checks import shown
 from nichechain.core.errors import NichechainError
 from nichechain.core.intervals import LEVEL, mean_interval
 from nichechain.studies.results import Interval
@@ -90,6 +91,8 @@ def compare_selections(study: SelectionStudy, records: pa.Table) -> tuple[Worth,
     """
     from scipy import stats
 
+    if not isinstance(records, pa.Table):
+        raise NichechainError(f"records is {shown(records)}, but must be a pyarrow.Table")
     frame = records.to_pandas(use_threads=False)
     searches: dict[tuple[str, int], pd.DataFrame] = dict(
         iter(frame.groupby(["selection", "run"], sort=False))
