@@ -22,7 +22,7 @@ from nichechain.chain.estimators import with_posterior
 from nichechain.chain.filters import counts_of
 from nichechain.chain.posterior import DirichletPosterior
 from nichechain.chain.prior import fit_prior
-from nichechain.core.checks import check_at_least
+from nichechain.core.checks import check_at_least, shown
 from nichechain.core.errors import NichechainError
 from nichechain.core.randomness import Purpose, keyed
 from nichechain.evolvability.coverage import expected_coverage
@@ -324,6 +324,8 @@ def _levels(
     levels: int,
 ) -> Floats:
     """Mean l-evolvability over niches, by each draw of T, (draws,): of so many levels that of this number."""
+    if not (like is None or isinstance(like, DirichletPosterior)):
+        raise NichechainError(f"like is {shown(like)}, but must be a posterior for T, or None")
     known = None if like is None else like.prior
     prior = fit_prior(counts) if known is None else fit_prior(counts, known.strength, known.weights)
     posterior = DirichletPosterior(counts, prior.base, prior.strength, prior.design_effect, prior)

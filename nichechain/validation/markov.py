@@ -25,7 +25,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 PERMUTATIONS = 499
-_MOST_PERMUTATIONS = 10_000_000
+_MOST_PERMUTATIONS, _MOST_BINS = 10_000_000, 10_000
 DEPTH_BINS = 3
 
 
@@ -104,6 +104,8 @@ def lineage_test(
         If a number is out of range.
     """
     check_at_least(1, depth_bins=depth_bins)
+    if depth_bins > _MOST_BINS:
+        raise NichechainError(f"depth_bins is {depth_bins}, but must be at most {_MOST_BINS}")
     known = triples.with_grandparent
     cuts = np.quantile(known.depth, np.arange(1, depth_bins) / depth_bins) if len(known) else np.empty(0)
     stratum = known.niche * depth_bins + np.searchsorted(cuts, known.depth)

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 
 Ints = NDArray[np.int64]
 
+_MOST_BIRTHS = 10**8
+
 
 def simulate_births(
     chain: NicheChain,
@@ -67,12 +69,16 @@ def simulate_births(
     check_whole(births=births, batch=batch)
     check_numbers(memory=memory)
     first = np.atleast_1d(as_whole("start", start))
+    if first.ndim != 1:
+        raise NichechainError(f"start has shape {first.shape}, but must be one state or several")
     if not 0 <= first.min(initial=0) <= first.max(initial=0) < chain.states or not first.size:
         raise NichechainError(f"start is {first.tolist()}, but must be states from 0 to {chain.states - 1}")
     if births < first.size or batch < 1:
         raise NichechainError(
             f"births are {births} in batches of {batch}, but must be at least {first.size} and 1"
         )
+    if births > _MOST_BIRTHS:
+        raise NichechainError(f"births are {births}, but must be at most {_MOST_BIRTHS}, which take 6 GB")
     if not 0.0 <= memory <= 1.0:
         raise NichechainError(f"memory is {memory}, but must be a probability")
     check_choice("replacement", replacement, get_args(Replacement))

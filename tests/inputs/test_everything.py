@@ -207,8 +207,6 @@ EXEMPT: dict[tuple[str, str], str] = {
         ("births.table.make_table", "offspring child_niche accepted step run", _WITHIN),
         ("evolvability.coverage.sampled_coverage", "first own", _WITHIN),
         ("evolvability.coverage.expected_coverage", "own", _WITHIN),
-        ("validation.drift.level_drift", "like", _WITHIN),
-        ("validation.drift.level_course", "like", _WITHIN),
         ("execution.base.evaluate_rows", "genotypes", _WITHIN),
         ("studies.running.run", "on_progress", _WITHIN),
         ("studies.searches.running.run_searches", "on_progress", _WITHIN),

@@ -237,7 +237,7 @@ CALLS = (
     Call(
         "validation.lineage_test",
         lambda w: {"triples": w.triples, "permutations": 9},
-        {"depth_bins": whole(0), **_TEST},
+        {"depth_bins": (10**9, *whole(0)), **_TEST},
     ),
     Call(
         "validation.lineages_test",
@@ -248,8 +248,8 @@ CALLS = (
         "validation.simulate_births",
         lambda w: {"chain": w.given, "births": 5, "rng": w.rng},
         {
-            "births": whole(0),
-            "start": (3, -1, [], [0.5], "three"),
+            "births": (10**12, *whole(0)),
+            "start": ([[0, 1]], 3, -1, [], [0.5], "three"),
             "batch": whole(0),
             "memory": SHARE,
             "replacement": UNKNOWN,
