@@ -29,6 +29,19 @@ def prepared() -> Iterator[None]:
         yield
     finally:
         sys.stderr, warnings.showwarning = before
+        _let_go(sys.stderr)
+
+
+def _let_go(stream: TextIO) -> None:
+    """Drop what a full disk did not take, which Python would try to write again as it ends, and fail."""
+    try:
+        stream.flush()
+    except OSError:
+        with contextlib.suppress(OSError):
+            nowhere = os.open(os.devnull, os.O_WRONLY)
+            os.dup2(nowhere, stream.fileno())
+            os.close(nowhere)
+            stream.flush()
 
 
 def _open_missing() -> None:

@@ -105,7 +105,7 @@ def replace_file(path: str | Path, content: bytes) -> None:
     try:
         write_atomically(as_path("path", path), content)
     except OSError as error:
-        raise NichechainError(f"{path} cannot be written: {error.strerror}") from error
+        raise NichechainError(f"{path} cannot be written: {error.strerror or error}") from error
 
 
 def sync_folder(folder: Path) -> None:

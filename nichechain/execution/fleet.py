@@ -10,6 +10,7 @@ from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import dataclass
 from queue import Empty, SimpleQueue
+from time import monotonic
 from types import TracebackType
 from typing import NoReturn, Self
 
@@ -19,7 +20,7 @@ from numpy.typing import NDArray
 from nichechain.core.errors import NichechainError
 from nichechain.domains.base import Domain, Evaluation
 from nichechain.domains.memory import cache_memory_of, check_cache_memory, limit_cache
-from nichechain.execution.base import WORKER_DIED, all_failed, evaluate_rows
+from nichechain.execution.base import LOOK_SECONDS, WORKER_DIED, all_failed, evaluate_rows
 from nichechain.execution.growing import Letter, Receiver, Sender, by_parent
 from nichechain.execution.pieces import LOSSES, Piece, Pieces
 from nichechain.variation.unborn import Unborn
@@ -253,12 +254,7 @@ class _Shift:
         while len(self._fleet._crew) < size:
             self._hire()
         while self._pieces.left:
-            try:
-                worker, piece, future = self._news.get(timeout=None if self._held else _PATIENCE)
-            except Empty:
-                raise NichechainError(
-                    f"no worker could be started within {_PATIENCE:.0f} s: are there free processors?"
-                ) from None
+            worker, piece, future = self._next()
             if worker not in self._fleet._crew:
                 continue
             try:
@@ -277,6 +273,18 @@ class _Shift:
                 self._fleet._proven = True
                 self._finish(piece, outcome)
             self._supply(worker)
+
+    def _next(self) -> tuple[Worker, Piece | None, Future[Outcome]]:
+        """What happens next, or an error where no worker comes."""
+        since = monotonic()
+        while True:
+            try:
+                return self._news.get(timeout=min(LOOK_SECONDS, _PATIENCE))
+            except Empty:
+                if not self._held and monotonic() - since >= _PATIENCE:
+                    raise NichechainError(
+                        f"no worker could be started within {_PATIENCE:.0f} s: are there free processors?"
+                    ) from None
 
     def _finish(self, piece: Piece, outcome: Evaluation) -> None:
         self._pieces.finish(piece, outcome)

@@ -5,10 +5,10 @@ from __future__ import annotations
 import threading
 from collections import deque
 from collections.abc import Callable, Iterable
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from typing import TypeVar
 
-from nichechain.execution.base import available_cpus
+from nichechain.execution.base import LOOK_SECONDS, available_cpus
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -45,6 +45,8 @@ def side_by_side(
     waiting: deque[Future[Result]] = deque()
 
     def take() -> None:
+        while not wait([waiting[0]], LOOK_SECONDS).done:
+            pass
         results.append(waiting.popleft().result())
         if on_done is not None:
             on_done(1)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from queue import SimpleQueue
+from queue import Empty, SimpleQueue
 from types import TracebackType
 
 import numpy as np
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from nichechain.domains.base import Domain, Evaluation
 from nichechain.domains.memory import check_cache_memory, limit_cache
-from nichechain.execution.base import count_workers, evaluate_rows
+from nichechain.execution.base import LOOK_SECONDS, count_workers, evaluate_rows
 from nichechain.variation.unborn import Unborn
 
 
@@ -73,7 +73,10 @@ class Threads:
             for _ in range(min(self._workers, chunks)):
                 self._pool.submit(work)
             while len(parts) < chunks:
-                told = news.get()
+                try:
+                    told = news.get(timeout=LOOK_SECONDS)
+                except Empty:
+                    continue
                 if isinstance(told, BaseException):
                     raise told
                 first, part = told

@@ -136,7 +136,7 @@ def test_progress_bars_on_a_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
 
     shown = io.StringIO()
     terminal = rich.console.Console(file=shown, force_terminal=True, width=100)
-    monkeypatch.setattr(rich.console, "Console", lambda **_: terminal)
+    monkeypatch.setattr(progress, "_console", lambda: terminal)
     with progress.stages() as tell:
         tell("search", 0, 7)
         tell("search", 7, 7)

@@ -239,8 +239,8 @@ class Broken(PlanarArm):
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        ({"offspring": 1}, "sample_size is 1"),
-        ({"offspring": -3}, "sample_size is -3"),
+        ({"offspring": 1}, "offspring is 1"),
+        ({"offspring": -3}, "offspring is -3"),
         ({"seed": -1}, "seed is -1"),
         ({"elites": 0}, "elites is 0"),
         ({"share": 0.0}, "share is 0.0"),

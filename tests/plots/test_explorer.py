@@ -235,7 +235,7 @@ def test_page_appears_whole_or_not_at_all(archive, tmp_path, monkeypatch):
     chain = archive.chain("mle")
     with monkeypatch.context() as patch:
         patch.setattr(Path, "replace", fails)
-        with pytest.raises(OSError, match="disk is full"):
+        with pytest.raises(NichechainError, match="disk is full"):
             write_explorer(archive, chain, out)
     assert out.read_text() == "before"
     assert [path.name for path in tmp_path.iterdir()] == ["explore.html"]
