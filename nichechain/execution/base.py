@@ -21,7 +21,7 @@ WORKER_DIED = "worker died"
 """Why a row failed that no worker outlives."""
 
 LOOK_SECONDS = 1.0
-"""Whoever waits for others wakes so often: a Ctrl-C in the instant before falling asleep is heard only then."""
+"""Who waits for others wakes so often: a Ctrl-C in the instant before falling asleep is heard only then."""
 
 _LONGEST_REASON = 500
 
