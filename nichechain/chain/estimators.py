@@ -154,7 +154,7 @@ def _dirichlet(counts: TransitionCounts, strength: float | str) -> NicheChain:
 def _empirical_bayes(counts: TransitionCounts, strength: float | None) -> NicheChain:
     prior = fit_prior(counts, None if strength is None else _positive(strength))
     effect = prior.design_effect
-    posterior = DirichletPosterior(counts, prior.base, prior.strength, effect, prior)
+    posterior = DirichletPosterior.of(counts, prior)
     posterior = replace(posterior, law=fitted_law(posterior))
     births = counts.births
     typical = (births * effect).sum() / max(1, births.sum())

@@ -100,7 +100,7 @@ class Neighbours:
     def said(self, kind: int, births: Floats) -> Floats:
         """Births that each niche hears of through each offset, weighted, (K, S)."""
         told = np.zeros((len(self.offsets), self.states))
-        speakers, first = np.unique(self.parent, return_index=True)
+        speakers, first = self._speakers
         if not speakers.size:
             return told
         whole = np.add.reduceat(births, first)
@@ -145,23 +145,33 @@ class Neighbours:
         A sum over speakers of rows that neighbours have in common: columns are states where births landed,
         or displacements where they moved.
         """
-        rows, weights = [], []
-        speakers, first = np.unique(self.parent, return_index=True)
-        for offset in self.offsets:
-            here = speakers[offset.told[first]]
-            rows.append(np.stack([here + offset.shift, here]))
-            weights.append(np.full(here.size, offset.weight))
-        whole = self.states, self.states
-        hears = sparse.csr_array((np.concatenate(weights), np.concatenate(rows, axis=1)), shape=whole)
-        starts = self.starts
+        whole, starts = (self.states, self.states), self.starts
         if kind == _LANDING:
-            return hears @ sparse.csr_array((births, self.child, starts), shape=whole)
+            return self._hears @ sparse.csr_array((births, self.child, starts), shape=whole)
         moves, column = np.unique(self._displacement(), return_inverse=True)
-        moved = hears @ sparse.csr_array((births, column, starts), shape=(self.states, moves.size))
+        moved = self._hears @ sparse.csr_array((births, column, starts), shape=(self.states, moves.size))
         row = np.repeat(np.arange(self.states), np.diff(moved.indptr))
         child = self._displaced(np.minimum(row, self.niches - 1), moves[moved.indices])
         there = child >= 0
         return sparse.csr_array((moved.data[there], (row[there], child[there])), shape=whole)
+
+    @cached_property
+    def _speakers(self) -> tuple[Ints, Ints]:
+        """Parents of pairs, each once, and the first pair of each."""
+        parent, first = np.unique(self.parent, return_index=True)
+        return parent, first
+
+    @cached_property
+    def _hears(self) -> sparse.csr_array:
+        """How much each niche hears of each that has births, (S, S)."""
+        rows, weights = [], []
+        speakers, first = self._speakers
+        for offset in self.offsets:
+            here = speakers[offset.told[first]]
+            rows.append(np.stack([here + offset.shift, here]))
+            weights.append(np.full(here.size, offset.weight))
+        index = tuple(np.concatenate(rows, axis=1))
+        return sparse.csr_array((np.concatenate(weights), index), shape=(self.states, self.states))
 
     @cached_property
     def moves(self) -> Flags:

@@ -59,6 +59,11 @@ class DirichletPosterior:
     prior: FittedPrior | None = None
     law: LineageLaw | None = None
 
+    @classmethod
+    def of(cls, counts: TransitionCounts, prior: FittedPrior) -> DirichletPosterior:
+        """That of births under a prior that was fitted to them."""
+        return cls(counts, prior.base, prior.strength, prior.design_effect, prior)
+
     @cached_property
     def weights(self) -> sparse.csr_array:
         """C_ij / e_i: births of each row as independent ones, (S, S)."""

@@ -1,4 +1,4 @@
-"""What is done with a study that was begun, whatever it studies: go on with it, report on it."""
+"""What is done with work that was begun: go on with it, start over, report on it."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from typing import Annotated
 import tyro
 
 from nichechain.cli import output, parsing
+from nichechain.core.errors import NichechainError
 
 
 @dataclass(frozen=True)
@@ -35,3 +36,21 @@ def stopped(command: str, folder: Path) -> int:
     again = f"nichechain {command} resume {shlex.quote(str(folder))}"
     output.console().print(f"Stopped; what was made is kept. To go on:\n  {again}")
     return 130
+
+
+def go_on_or_start_over(kept: Path, what: str, *, resume: bool, force: bool) -> None:
+    """Leave what an interruption left, or remove it, as ``--resume`` and ``--force`` say.
+
+    Raises
+    ------
+    NichechainError
+        If there is something, and neither is given; or if both are.
+    """
+    if resume and force:
+        raise NichechainError("--resume and --force exclude each other: go on, or start over")
+    if kept.exists() and not resume:
+        if not force:
+            raise NichechainError(
+                f"{kept} holds an interrupted {what}: --resume goes on with it, --force starts over"
+            )
+        kept.unlink()

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from nichechain.cli import output, parsing, progress, workers
+from nichechain.cli import begun, output, parsing, progress, workers
 from nichechain.core.checks import check_at_least
 from nichechain.core.errors import NichechainError
 from nichechain.core.text import rounded
@@ -90,14 +90,7 @@ def run(arguments: Sequence[str]) -> int:
     out = command.out or Path(f"{archive.folder.name}-landscape.csv")
     output.check_out(out, TABLES)
     keep = out.with_name(f"{out.name}.partial")
-    if command.resume and command.force:
-        raise NichechainError("--resume and --force exclude each other: go on, or start over")
-    if keep.exists() and not command.resume:
-        if not command.force:
-            raise NichechainError(
-                f"{keep} holds an interrupted measurement: --resume goes on with it, --force starts over"
-            )
-        keep.unlink()
+    begun.go_on_or_start_over(keep, "measurement", resume=command.resume, force=command.force)
     # Step sizes that are genes come with the archive's own domain; an operator is of the weights' one.
     domain = archive.domain
     weights = domain.domain if isinstance(domain, SelfAdaptiveDomain) else domain

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from nichechain.cli import output, parsing, progress, workers
+from nichechain.cli import begun, output, parsing, progress, workers
 from nichechain.core.errors import NichechainError
 from nichechain.core.files import replace_file
 from nichechain.core.text import some
@@ -61,14 +61,7 @@ def run(arguments: Sequence[str]) -> int:
     if out.exists() and not out.is_dir():
         raise NichechainError(f"--out is {str(out)!r}, but that is a file, not a folder")
     keep = out.with_name(f"{out.name}.partial")
-    if command.resume and command.force:
-        raise NichechainError("--resume and --force exclude each other: go on, or start over")
-    if keep.exists() and not command.resume:
-        if not command.force:
-            raise NichechainError(
-                f"{keep} holds interrupted lineages: --resume goes on with them, --force starts over"
-            )
-        keep.unlink()
+    begun.go_on_or_start_over(keep, "validation", resume=command.resume, force=command.force)
     try:
         with (
             workers.hired(command.workers, command.cache_memory) as executor,

@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import io
-import json
-import zipfile
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -16,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nichechain.core.errors import NichechainError
-from nichechain.core.files import write_atomically
+from nichechain.core.unfinished import read_unfinished, write_unfinished
 from nichechain.domains.base import Domain
 from nichechain.landscape.genotypes import make_offspring
 from nichechain.variation import Mutation
@@ -67,33 +64,17 @@ class Kept:
             If it is damaged, or what made it differs.
         """
         kept = cls(path, made_by)
-        if path is None or not path.exists():
-            return kept
-        try:
-            with np.load(io.BytesIO(path.read_bytes()), allow_pickle=False) as arrays:
-                found = json.loads(str(arrays["made_by"]))
-                families = dict(zip(arrays["key"].tolist(), arrays["families"], strict=True))
-        except (ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
-            raise NichechainError(f"{path} is damaged, remove it: {error}") from error
-        if not isinstance(found, dict) or found != made_by:
-            odd = ", ".join(name for name in made_by if found.get(name) != made_by[name])
-            raise NichechainError(f"{path} holds measurements that differ in {odd}: start over, or remove it")
-        kept.families = families
+        arrays = read_unfinished(path, made_by, "measurements", "key", "families")
+        if arrays is not None:
+            kept.families = dict(zip(arrays["key"].tolist(), arrays["families"], strict=True))
         return kept
 
     def save(self) -> None:
         """Make all families durable."""
-        if self.path is None or not self.families:
-            return
-        buffer = io.BytesIO()
-        np.savez(
-            buffer,
-            allow_pickle=False,
-            made_by=np.array(json.dumps(self.made_by)),
-            key=np.array(list(self.families)),
-            families=np.stack(list(self.families.values())),
-        )
-        write_atomically(self.path, buffer.getvalue())
+        if self.path is not None and self.families:
+            families = np.stack(list(self.families.values()))
+            arrays = {"key": np.array(list(self.families)), "families": families}
+            write_unfinished(self.path, self.made_by, arrays)
 
 
 def sample_families(

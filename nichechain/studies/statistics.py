@@ -22,11 +22,12 @@ Floats = NDArray[np.float64]
 Statistic = Callable[..., Any]
 
 RESAMPLES = 1999
+"""Resamples of every bootstrap."""
+
 # More would be told from no others, and take hours.
 _MOST_RESAMPLES = 1_000_000
 # Resamples in memory at a time.
 _AT_ONCE = 2000
-"""Resamples of every bootstrap."""
 
 
 def pressure_test(

@@ -328,7 +328,7 @@ def _levels(
         raise NichechainError(f"like is {shown(like)}, but must be a posterior for T, or None")
     known = None if like is None else like.prior
     prior = fit_prior(counts) if known is None else fit_prior(counts, known.strength, known.weights)
-    posterior = DirichletPosterior(counts, prior.base, prior.strength, prior.design_effect, prior)
+    posterior = DirichletPosterior.of(counts, prior)
     if like is not None and like.law is not None:
         # What is not known of the law is the same for all parts, so that none of it tells them apart.
         posterior = replace(posterior, law=like.law.taken_as_known())

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import io
-import json
-import zipfile
 from collections.abc import Callable
 from pathlib import Path
 from time import monotonic
@@ -14,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nichechain.core.errors import NichechainError
-from nichechain.core.files import write_atomically
+from nichechain.core.unfinished import read_unfinished, write_unfinished
 from nichechain.variation.unborn import Unborn
 
 Ints = NDArray[np.int64]
@@ -47,10 +44,11 @@ class Evaluated:
     """
 
     def __init__(self, path: Path | None, made_by: dict[str, Any], on_done: Told | None = None) -> None:
-        self._path, self._on_done = path, on_done
-        # As it will be read: JSON knows no tuples.
-        self._made_by = json.loads(json.dumps(made_by))
-        self._states = _read(path, self._made_by)
+        self._path, self._made_by, self._on_done = path, made_by, on_done
+        kept = read_unfinished(path, made_by, "lineages", "states")
+        self._states: Ints = np.zeros(0, np.int64) if kept is None else kept["states"]
+        if self._states.ndim != 1 or self._states.dtype != np.int64:
+            raise NichechainError(f"{path} is damaged, remove it: its states are no whole numbers")
         self._used, self._piece, self._saved = 0, _FIRST_PIECE, monotonic()
 
     def of(self, births: Unborn, evaluate: Evaluate) -> Ints:
@@ -92,28 +90,6 @@ class Evaluated:
         return self._states[start:end]
 
     def _save(self) -> None:
-        if self._path is None or not self._states.size:
-            return
-        buffer = io.BytesIO()
-        np.savez(buffer, allow_pickle=False, made_by=np.array(json.dumps(self._made_by)), states=self._states)
-        self._path.parent.mkdir(parents=True, exist_ok=True)
-        write_atomically(self._path, buffer.getvalue())
-        self._saved = monotonic()
-
-
-def _read(path: Path | None, made_by: dict[str, Any]) -> Ints:
-    if path is None or not path.exists():
-        return np.zeros(0, np.int64)
-    try:
-        with np.load(io.BytesIO(path.read_bytes()), allow_pickle=False) as arrays:
-            found, states = json.loads(str(arrays["made_by"])), arrays["states"]
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
-        raise NichechainError(f"{path} is damaged, remove it: {error}") from error
-    found = found if isinstance(found, dict) else {}
-    if found != made_by:
-        odd = ", ".join(name for name in made_by if found.get(name) != made_by[name])
-        raise NichechainError(f"{path} holds lineages that differ in {odd}: start over, or remove it")
-    if states.ndim != 1 or states.dtype != np.int64:
-        raise NichechainError(f"{path} is damaged, remove it: its states are no whole numbers")
-    known: Ints = states
-    return known
+        if self._path is not None and self._states.size:
+            write_unfinished(self._path, self._made_by, {"states": self._states})
+            self._saved = monotonic()
